@@ -1,4 +1,4 @@
-"""What the system or one of Blender's operators refuses, in one sentence."""
+"""What the system or one of Blender's operators refuses, and what is to be said of objects, in one sentence each."""
 
 import os
 import shutil
@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..core.errors import BadInputError, StorageError
+from ..core.kinds import Shown
+
+MAX_TOLD: Shown[int] = 3
 
 
 def reason_of(error: Exception) -> str:
@@ -36,3 +39,18 @@ def whole_folder(folder: Path, what: str) -> Iterator[Path]:
             os.replace(part, folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def sentences(*told: tuple[list[str], str]) -> tuple[str, ...]:
+    """One on all objects of which the same is to be said, by their names; none where there are none."""
+    return tuple(f"{_few(names)}: {what}." for names, what in told if names)
+
+
+def _few(names: list[str]) -> str:
+    """The objects of these names, for a sentence: the first ones, and how many more."""
+    shown = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
+    return (
+        f"Objects {shown} and {len(names) - MAX_TOLD} more"
+        if len(names) > MAX_TOLD
+        else f"Object{'s' if len(names) > 1 else ''} {shown}"
+    )

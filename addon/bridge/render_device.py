@@ -14,7 +14,7 @@ TYPES = ("OPTIX", "CUDA", "HIP", "METAL", "ONEAPI")
 
 def told_device(scene: bpy.types.Scene) -> str:
     """The device that this scene renders on here, for `use_device`: 'CPU', or a kind and the cards' ids."""
-    preferences = _preferences()
+    preferences = preferences_of_cycles()
     if preferences is None or scene.cycles.device != "GPU" or preferences.compute_device_type == "NONE":
         return CPU
     kind = preferences.compute_device_type
@@ -53,16 +53,19 @@ def use_device(scene: bpy.types.Scene, told: str) -> str:
             scene.cycles.device = "GPU"
             return ""
     scene.cycles.device = "CPU"
-    return (
-        "Blender finds no such graphics card here, so the processor renders."
-        if kind == GPU
-        else f"Blender finds no {kind} device here, so the processor renders."
-    )
+    what = "such graphics card" if kind == GPU else f"{kind} device"
+    return f"Blender finds no {what} here, so the processor renders."
+
+
+def preferences_of_cycles():
+    """Cycles' preferences of this Blender; None where the add-on is off."""
+    addon = bpy.context.preferences.addons.get("cycles")
+    return addon.preferences if addon else None
 
 
 def _enable(kind: str, wanted: set[str]) -> bool:
     """Switch on the devices of a kind, those of `wanted` alone if there are any; whether there is one."""
-    preferences = _preferences()
+    preferences = preferences_of_cycles()
     if preferences is None:
         return False
     before = preferences.compute_device_type
@@ -78,8 +81,3 @@ def _enable(kind: str, wanted: set[str]) -> bool:
     if not chosen:
         preferences.compute_device_type = before
     return bool(chosen)
-
-
-def _preferences():
-    addon = bpy.context.preferences.addons.get("cycles")
-    return addon.preferences if addon else None

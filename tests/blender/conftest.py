@@ -20,6 +20,17 @@ def honest(scene):
     cycles.sample_clamp_indirect, cycles.blur_glossy = 0, 0
 
 
+def set_world(scene, path, strength=1.0):
+    """Light a scene by an environment image, as a result's is; black without one."""
+    from addon.bridge.data.images import load_image
+    from addon.bridge.data.nodes import make_world
+
+    scene.world = make_world(
+        "Scan Relight", path and load_image(path, "Scan Relight environment", keep=False), strength
+    )
+    return scene.world
+
+
 @pytest.fixture
 def scene():
     """An empty factory scene, black world, rendered by an honest Cycles."""

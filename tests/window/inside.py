@@ -169,7 +169,7 @@ def pause_in(stage):
     for _ in range(3000):
         job = module("addon.bridge.job.job").current()
         if job is not None and job.running and job.stage == stage:
-            os.kill(job.process_id, signal.SIGSTOP)
+            os.kill(job._process.pid, signal.SIGSTOP)
             return job.stage
         yield
     raise RuntimeError(f"the run never came to {stage}: {phase()}")

@@ -24,7 +24,7 @@ with bpy.context.temp_override(**place()):
     bpy.ops.scan_relight.run("INVOKE_DEFAULT", target="recover")
 """)
     window.wait_for(f"{JOB}.stage == 'shading'")
-    yield window, window.ask(f"{JOB}.process_id")
+    yield window, window.ask(f"{JOB}._process.pid")
     window.close()
 
 

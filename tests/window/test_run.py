@@ -43,7 +43,7 @@ choices.settings.shading_rays = {RAYS}
     window.ask("pause_in('shading')")  # drawn by software, the window is slower than the run
     window.picture(pictures / "04-progress.png")
     window.picture(pictures / "04-progress-sidebar.png", sidebar=True)
-    window.ask(f"os.kill({JOB}.process_id, signal.SIGCONT)")
+    window.ask(f"os.kill({JOB}._process.pid, signal.SIGCONT)")
     pressed = window.key("Escape")
     window.wait_for(f"{ACTIVE} is None")
     assert window.ask(f"{JOB}.state") == "stopped"

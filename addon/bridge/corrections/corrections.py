@@ -22,6 +22,7 @@ from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
 from . import material, unseen
+from .material import entry
 from .unseen import room_of
 
 ROUGHNESS: Shown[float] = 0.3
@@ -47,11 +48,6 @@ def result_folder(thing: bpy.types.Object) -> Path | None:
     folder = Path(thing[RESULT]) if thing.get(RESULT) else None
     result = file.read(folder) if folder else None
     return folder if result is not None and result.objects else None
-
-
-def entry(thing: bpy.types.Object) -> dict[str, Any]:
-    """What an object's own run says of it; {} where that is gone or another run took its place."""
-    return file.rows([thing]).get(thing, {})
 
 
 def made_by(folder: Path) -> dict[int, dict[str, Any]]:
@@ -96,7 +92,7 @@ def give(thing: bpy.types.Object, **values) -> None:
     )
     older = {i: Given(**_tuples(given(one))) for i, one in room.items() if i == number or GIVEN in one}
     said = merge(Overrides(older), newer).of(number).as_dict()
-    material.note(thing, entry(thing))
+    material.note(thing)
     thing[GIVEN] = json.dumps(said)
     show(thing)
     for other in room_of(thing):
@@ -125,13 +121,8 @@ def by_id(thing: bpy.types.Object, number: int) -> bpy.types.Object | None:
     return next((one for one in room_of(thing) if one[OBJECT_ID] == number and correctable(one)), None)
 
 
-def found(thing: bpy.types.Object) -> dict[str, Any]:
-    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
-    return material.found(thing, entry(thing))
-
-
 def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[str, Any]:
-    """The same with what is given laid over it."""
+    """What was found of an object (`material.found`) with what is given laid over it."""
     said = given(thing)
     other = by_id(thing, said["same_as"]) if said.get("same_as") is not None else None
     theirs = {}
@@ -161,11 +152,10 @@ def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[st
 
 def _under(thing: bpy.types.Object, said: dict, model: str | None) -> dict[str, Any]:
     """What to lay given values over: what the run fitted to that model, else what was found before it was given one."""
-    told, was = entry(thing), found(thing)
-    made = material.worn(thing, told)
+    was, made = material.found(thing), material.worn(thing)
     if made["model"] != (model or was["model"]):
         return was
-    back = (told.get("given") or {}).keys() - said.keys()  # given to the run, and not any more
+    back = (entry(thing).get("given") or {}).keys() - said.keys()  # given to the run, and not any more
     return made | {key: was[key] for key in made if key in back or ("same_as" in back and key in LOBE)}
 
 
@@ -173,8 +163,8 @@ def show(thing: bpy.types.Object) -> None:
     """Bring an object's material in line with what is given."""
     if correctable(thing):
         with our_own(material.worn_material(thing)):
-            material.show(thing, effective(thing), entry(thing))
-        if not given(thing) and found(thing) == material.worn(thing, entry(thing)):
+            material.show(thing, effective(thing))
+        if not given(thing) and material.found(thing) == material.worn(thing):
             thing.pop(FOUND, None)
 
 
@@ -182,11 +172,7 @@ def reapply(thing: bpy.types.Object) -> list[str]:
     """Bring back what the artist did to an object whose mesh or material a run has just made anew.
 
     Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
-
-    Returns
-    -------
-    list of str
-        Sentences on what no longer fits.
+    Returns sentences on what no longer fits.
     """
     if thing.type == "MESH" and SMOOTH in thing and not thing.data.library:
         _shade(thing.data, thing[SMOOTH])
@@ -202,12 +188,7 @@ def smooth(things: Iterable[bpy.types.Object], angle: float) -> int:
     """Shade objects smooth but for edges sharper than `angle` radians; 0 makes them flat again.
 
     The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
-    found.
-
-    Returns
-    -------
-    int
-        How many meshes were changed.
+    found. Returns how many meshes were changed.
     """
     changed = set()
     for thing in things:

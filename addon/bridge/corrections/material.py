@@ -27,6 +27,7 @@ from ..data.materials import (
 )
 from ..data.nodes import feed, mix_node
 from ..marks import FOUND
+from ..results import file
 
 WORN = "scan_relight_worn"
 """Of a material: JSON of the values and sockets that its run gave it, while it shows others."""
@@ -47,21 +48,26 @@ def worn_material(thing: bpy.types.Object) -> bpy.types.Material | None:
     )
 
 
-def found(thing: bpy.types.Object, entry: dict[str, Any]) -> dict[str, Any]:
-    """`model`, `roughness`, `f0` and `base_color` as found, or None; `entry` is what materials.json says, if known."""
-    return worn(thing, entry) | json.loads(thing.get(FOUND, "{}"))
+def entry(thing: bpy.types.Object) -> dict[str, Any]:
+    """What an object's own run says of it; {} where that is gone or another run took its place."""
+    return file.rows([thing]).get(thing, {})
 
 
-def worn(thing: bpy.types.Object, entry: dict[str, Any]) -> dict[str, Any]:
+def found(thing: bpy.types.Object) -> dict[str, Any]:
+    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
+    return worn(thing) | json.loads(thing.get(FOUND, "{}"))
+
+
+def worn(thing: bpy.types.Object) -> dict[str, Any]:
     """The same as the run has made its material, under whatever was given to that run."""
     material = worn_material(thing)
-    return json.loads(material[WORN])["values"] if WORN in material else _shown(material, entry)
+    return json.loads(material[WORN])["values"] if WORN in material else _shown(material, entry(thing))
 
 
-def note(thing: bpy.types.Object, entry: dict[str, Any]) -> None:
+def note(thing: bpy.types.Object) -> None:
     """Note what was found, before the first thing is given."""
-    if FOUND not in thing and not entry.get("given"):
-        thing[FOUND] = json.dumps(worn(thing, entry))
+    if FOUND not in thing and not entry(thing).get("given"):
+        thing[FOUND] = json.dumps(worn(thing))
 
 
 def renew(thing: bpy.types.Object, given: dict[str, Any]) -> None:
@@ -75,17 +81,15 @@ def renew(thing: bpy.types.Object, given: dict[str, Any]) -> None:
         thing.pop(FOUND, None)
 
 
-def show(thing: bpy.types.Object, wanted: dict[str, Any], entry: dict[str, Any]) -> None:
+def show(thing: bpy.types.Object, wanted: dict[str, Any]) -> None:
     """Bring a material in line.
 
     Parameters
     ----------
     wanted : dict
         `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
-    entry : dict
-        What materials.json says of the object.
     """
-    material, made = worn_material(thing), worn(thing, entry)
+    material, made = worn_material(thing), worn(thing)
     if WORN not in material:
         if wanted == made:
             return

@@ -13,7 +13,7 @@ from ..data.materials import dress
 from ..data.mesh_objects import is_open
 from ..light import lamps
 from ..marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
-from ..refused import refused
+from ..refused import refused, sentences
 from ..results import changes, file
 from ..results import images as result_images
 from ..scene.as_made import is_corrected, stamp_tree
@@ -101,11 +101,7 @@ def bringing(
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             mark(collection, folder, run)
             changes.keep(collection, changes.found(folder))
-    if by_hand:
-        from ..own_scene.capture import few  # not earlier: Blender's start should not wait for what it imports
-
-        warnings.append(f"{few(by_hand)}: the material was edited by hand and stays.")
-    return tuple(warnings)
+    return (*warnings, *sentences((by_hand, "the material was edited by hand and stays")))
 
 
 def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:

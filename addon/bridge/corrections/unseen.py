@@ -22,7 +22,7 @@ from ..data.materials import BASE_COLOR, principled
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import image_node
 from ..marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
-from ..refused import refused
+from ..refused import refused, sentences
 from ..results import images
 from ..scene.as_made import our_own
 from .material import worn_material
@@ -108,13 +108,7 @@ def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
 
 
 def reapply(thing: bpy.types.Object) -> list[str]:
-    """Show what was painted on an object again whose mesh or material a run has just made anew.
-
-    Returns
-    -------
-    list of str
-        Sentences on what no longer fits.
-    """
+    """Show what was painted on an object again whose mesh or material is new; sentences on what no longer fits."""
     image, node = painted(thing), texture_node(thing)
     if image is None or node is None or node.image == image:
         return []
@@ -238,8 +232,6 @@ def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[
     BadInputError, StorageError
         As of `own_image` and `unseen_mask`; nothing is changed then.
     """
-    from ..own_scene.capture import few
-
     groups: dict[str, list] = {}
     passed: dict[str, list[str]] = {}
     for thing in things:
@@ -250,7 +242,7 @@ def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[
             groups.setdefault(path_of(node.image), []).append(thing)
     seen = {path: coverage(some[0]) for path, some in groups.items()}
     count = sum(_fill(some, seen[path], where, passed) for path, some in groups.items())
-    return count, [f"{few(names)}: {why}." for why, names in passed.items()]
+    return count, list(sentences(*((names, why) for why, names in passed.items())))
 
 
 def _fill(things, seen, where, passed) -> int:

@@ -1,6 +1,7 @@
 """Data that is added to the open file: so that it can be taken away again, and in collections of its own."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import bpy
 
@@ -42,6 +43,16 @@ class Made:
                 bpy.data.batch_remove(found)
 
 
+@contextmanager
+def scene_apart(name: str) -> Iterator[tuple[bpy.types.Scene, Made]]:
+    """A scene of its own; it goes with all that came into the file meanwhile, and nothing else changes."""
+    made = Made()
+    try:
+        yield bpy.data.scenes.new(name), made
+    finally:
+        made.remove()
+
+
 def _known(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:
     """The scene's collection `name`, however Blender numbered it."""
     return next((part for part in scene.collection.children if part.name.split(".")[0] == name), None)
@@ -56,9 +67,8 @@ def own_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return part
 
 
-def remove_own(scene: bpy.types.Scene, name: str, things: Iterable[bpy.types.Object]) -> int:
+def remove_own(scene: bpy.types.Scene, name: str, things: list[bpy.types.Object]) -> int:
     """Take things away with their data, and the collection `name` once it is empty; returns how many."""
-    things = list(things)
     data = {thing.data for thing in things}
     bpy.data.batch_remove(things)
     bpy.data.batch_remove([one for one in data if not one.users])

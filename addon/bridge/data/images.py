@@ -21,7 +21,7 @@ DATA = "Non-Color"
 
 
 def load_image(
-    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False, keep: bool = True
+    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, keep: bool = True
 ) -> bpy.types.Image:
     """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
 
@@ -33,8 +33,6 @@ def load_image(
         Name of the image in Blender; the file's stem if left out.
     colour_space : str
         `RADIANCE` or `DATA`.
-    packed : bool
-        Store the file's bytes within the .blend.
     keep : bool
         Give it a fake user, so that it is saved although no material shows it.
 
@@ -66,8 +64,6 @@ def load_image(
     layout = layout_of(result_of(path))
     if layout:
         image[LAYOUT] = layout
-    if packed:
-        image.pack()
     return image
 
 
@@ -115,14 +111,13 @@ def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> 
     colour_space : str
         `RADIANCE` or `DATA`.
     """
-    height, width = pixels.shape[:2]
+    pixels = np.atleast_3d(pixels)
+    height, width, channels = pixels.shape
     image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=colour_space == DATA)
     # The colour space comes first: setting it afterwards would throw the pixels away.
     image.colorspace_settings.name = colour_space
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = (pixels if pixels.ndim == 3 else pixels[..., None])[..., :3]
-    if pixels.ndim == 3 and pixels.shape[2] == 4:
-        rgba[..., 3] = pixels[..., 3]
+    rgba[..., : max(channels, 3)] = pixels
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     image.pack()

@@ -1,9 +1,7 @@
 """Meshes that the core has no reader for, through Blender's importers; what is open in Blender stays as it is."""
 
-import contextlib
 import re
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +13,7 @@ from ...core.io.gltf_nodes import Placed
 from ...core.io.layout import RawMesh
 from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
-from .added import Made
+from .added import scene_apart
 from .arrays import layer_of, read, triangles_of, vertices_of
 from .shown import shown
 
@@ -36,7 +34,10 @@ def import_mesh(path: Path) -> RawMesh:
             f"Mesh '{path}' {'is not a file' if path.exists() else 'does not exist'}; a capture needs its mesh there."
         )
     try:
-        with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, _scene_apart() as (scene, made):
+        with (
+            tempfile.TemporaryDirectory(prefix="scan_relight_") as folder,
+            scene_apart("Scan Relight import") as (scene, made),
+        ):
             placed = _import(path, Path(folder), scene)
             scene.view_layers[0].update()  # world matrices
             parts = _parts(made.new("objects"), placed)  # not all_objects: making that list takes its length squared
@@ -72,17 +73,6 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
             raise BadInputError(
                 f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
             ) from error
-
-
-@contextlib.contextmanager
-def _scene_apart() -> Iterator[tuple[bpy.types.Scene, Made]]:
-    """A scene of its own; it goes with all that came into it, and nothing else changes."""
-    made = Made()
-    scene = bpy.data.scenes.new("Scan Relight import")
-    try:
-        yield scene, made
-    finally:
-        made.remove()
 
 
 class _Part(NamedTuple):

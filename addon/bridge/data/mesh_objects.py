@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 import numpy as np
 
+from ...core.groups import by_number
 from ...core.scene.model import Instance, Mesh
 from ..marks import OBJECT_ID
 from .arrays import make_mesh, read, set_layer
@@ -43,13 +44,11 @@ def each_object(
         `object_id` and the object. The origin lies in the middle of the object's box; shading is flat, because the
         scan's geometric normals are what the light was divided by.
     """
-    order = np.argsort(mesh.object_id, kind="stable")
-    sorted_id = mesh.object_id[order]
+    triangles = by_number(mesh.object_id)
     for instance in instances:
-        first, last = np.searchsorted(sorted_id, [instance.object_id, instance.object_id + 1])
-        if first == last:
+        own = triangles.get(instance.object_id)
+        if own is None:
             continue
-        own = order[first:last]
         # Triangles that repeat a vertex are dropped by no one: they show nothing.
         used, corners = np.unique(mesh.triangles[own].ravel(), return_inverse=True)
         vertices = mesh.vertices[used]

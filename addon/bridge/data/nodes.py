@@ -1,11 +1,8 @@
 """Node trees of materials, worlds and modifiers; the world: light from directions where no surface was scanned."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import bpy
-
-from .images import load_image
 
 
 def fresh_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
@@ -66,29 +63,16 @@ def _behind(socket: bpy.types.NodeSocket, seen: set) -> Iterator[bpy.types.Node]
                 yield from _behind(inner, seen)
 
 
-def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: float = 1.0) -> bpy.types.World:
-    """Give a scene a world of its own.
+def make_world(name: str, image: bpy.types.Image | None, strength: float = 1.0) -> bpy.types.World:
+    """A world that shows an equirectangular picture, or black.
 
     Parameters
     ----------
-    environment : Path, str or None
-        Equirectangular radiance, linear Rec.709, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi),
-        v = 0.5 + asin(z) / pi. None: black.
+    image : bpy.types.Image, optional
+        Radiance, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi), v = 0.5 + asin(z) / pi.
     strength : float
         Factor on the radiance.
-
-    Raises
-    ------
-    BadInputError
-        The file is missing or is no image.
     """
-    image = None if environment is None else load_image(environment, "Scan Relight environment", keep=False)
-    scene.world = make_world("Scan Relight", image, strength)
-    return scene.world
-
-
-def make_world(name: str, image: bpy.types.Image | None, strength: float) -> bpy.types.World:
-    """A world that shows an equirectangular picture, or black."""
     world = bpy.data.worlds.new(name)
     tree = fresh_tree(world)
     texture = image and add_node(tree, "ShaderNodeTexEnvironment", image=image, location=(-300, 0)).outputs[0]

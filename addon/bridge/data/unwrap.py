@@ -14,6 +14,7 @@ from ...core.scene.params import SURFACE
 from ...core.scene.unwrap import of_parts
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
+from .added import scene_apart
 from .arrays import layer_of, make_mesh, set_layer
 from .shown import shown
 
@@ -78,7 +79,7 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
         polygons = polygons._replace(corner=polygons.corner[whole])
     if len(triangles):
         uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
-    return np.clip(np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0), 0, 1)
+    return np.clip(uv, 0, 1)
 
 
 def _with_more(polygons, triangles):
@@ -198,10 +199,9 @@ def _laid_out(points, vertex, start, uv, operator, **settings):
 
     Its faces are given by the vertex of each corner and the first corner of each face; `uv` is what it begins with.
     """
-    scene = bpy.data.scenes.new("Scan Relight unwrap")
-    data = make_mesh("Scan Relight unwrap", points, vertex, start)
-    thing = bpy.data.objects.new("Scan Relight unwrap", data)
-    try:
+    with scene_apart("Scan Relight unwrap") as (scene, _):
+        data = make_mesh("Scan Relight unwrap", points, vertex, start)
+        thing = bpy.data.objects.new("Scan Relight unwrap", data)
         set_layer(data, _LAYER, uv)
         scene.collection.objects.link(thing)
         scene.tool_settings.use_uv_select_sync = True
@@ -216,7 +216,3 @@ def _laid_out(points, vertex, start, uv, operator, **settings):
             finally:
                 bpy.ops.object.mode_set(mode="OBJECT")
         return np.nan_to_num(layer_of(data, _LAYER), nan=0.0, posinf=0.0, neginf=0.0)
-    finally:
-        bpy.data.objects.remove(thing)
-        bpy.data.meshes.remove(data)
-        bpy.data.scenes.remove(scene)

@@ -7,13 +7,10 @@ import numpy as np
 
 from ...core.brdf.material import from_json
 from ...core.io.read import read_capture
-from ...core.kinds import Workload
 from ...core.scene.model import Capture
+from ...core.scene.params import VISIBILITY
 from ...core.scene.rays import RayScene
 from .room import room
-
-MIN_COSINE: Workload[float] = 0.2
-"""More slanting views count as none, as in the method."""
 
 
 def comparison(capture: Path, result: Path) -> str:
@@ -25,8 +22,6 @@ def comparison(capture: Path, result: Path) -> str:
     ----------
     capture : Path
         The demo's, with its truth.
-    result : Path
-        The result folder.
     """
     truth = json.loads((capture / "truth" / "materials.json").read_text())
     true_colours = seen_albedo(read_capture(capture))
@@ -60,7 +55,7 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
     scene = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     means = {}
     for thing in room():
-        points, colours, share = thing.samples(max(64, 6000 // len(thing.quads)))
+        points, colours, share = thing.samples()
         normals = np.repeat(thing.normals(), points.shape[1], 0)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = points.reshape(-1, 3) + 1e-4 * normals
@@ -70,7 +65,7 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
             pixels, depth = camera.project(points)
             ray = camera.centre - points
             distance = np.linalg.norm(ray, axis=1)
-            facing = (ray * normals).sum(1) > MIN_COSINE * distance
+            facing = (ray * normals).sum(1) > VISIBILITY.min_cosine * distance
             inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(1) & (depth > 0)
             ask = np.flatnonzero(facing & inside & ~seen)
             seen[ask] = ~scene.occluded(

@@ -11,7 +11,7 @@ from ...core.brdf.compensation import ior_of
 from ...core.io.exr import read_header
 from ...core.kinds import Workload
 from ...core.progress import Progress
-from ..data.added import Made
+from ..data.added import scene_apart
 from ..data.arrays import set_layer
 from ..data.images import array_image
 from ..data.materials import BASE_COLOR, plain_material, principled, texture
@@ -23,13 +23,12 @@ from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""
 
-FORMAT: Workload[int] = (
-    3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
-)
+FORMAT: Workload[int] = 3
+"""Raised when the room or its rendering changes, so that an older capture is not taken for this one."""
 
 
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
-    """Render the demo's room into `folder`, unless it is there already.
+    """Render the demo's room into `folder`, unless it is there already; returns `folder`.
 
     Parameters
     ----------
@@ -38,11 +37,6 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         only the demo's comparison reads.
     size : str
         One of `SIZES`.
-
-    Returns
-    -------
-    Path
-        `folder`.
     """
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):
@@ -72,9 +66,7 @@ def stamp_of(size: str) -> dict:
 
 def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
     """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
-    made = Made()
-    scene = bpy.data.scenes.new("demo")
-    try:
+    with scene_apart("demo") as (scene, _):
         for thing in things:
             scene.collection.objects.link(build(thing))
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -91,8 +83,6 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
             bpy.ops.render.render(write_still=True, scene=scene.name)
             read_header(folder / frame_path(k))  # raises where it is absent or cut off
         progress.update(1.0)
-    finally:
-        made.remove()
 
 
 def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:

@@ -73,11 +73,12 @@ class Thing:
             index, uv, slot = index[:, corners].reshape(-1, 3), uv[:, corners].reshape(-1, 3, 2), np.repeat(slot, 2)
         return vertices, index, uv, slot
 
-    def samples(self, count: int = 64) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`count` points on each quad, (q, count, 3), their base colours (q, count, 3) and share of surface (q, count).
+    def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """n points on each quad, (q, n, 3), their base colours (q, n, 3) and share of the surface (q, n).
 
         They lie on no grid, so that no stripe of a texture falls between them.
         """
+        count = max(64, 6000 // len(self.quads))
         a, b = (((np.arange(count) + 0.5) * step % 1)[None, :, None] for step in (0.7548776662, 0.5698402910))
         weights = (1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b
         points, uv = (sum(w * corners[:, None, k] for k, w in enumerate(weights)) for corners in (self.quads, self.uv))
@@ -104,7 +105,7 @@ class Thing:
 
     def mean_albedo(self) -> np.ndarray:
         """Base colour averaged over the surface, (3,) float64."""
-        _, colours, share = self.samples(max(64, 6000 // len(self.quads)))
+        _, colours, share = self.samples()
         return np.einsum("qkc,qk->c", colours, share)
 
 

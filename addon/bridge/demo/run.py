@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.atomic import write_bytes
+from ...core.io.folder import SCENE
 from ...core.kinds import Workload
 from ...core.pipeline.run import WEIGHTS
 from ...core.progress import Progress, ProgressEvent
@@ -62,7 +63,7 @@ def run_demo(
     progress.done(stored)
     run(capture, out, settings, progress)
     progress.stage("pictures")
-    bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))
+    bpy.ops.wm.open_mainfile(filepath=str((out / SCENE).absolute()))
     table = comparison(capture, out)
     write_bytes(out / "comparison.txt", f"{table}\n".encode())
     pictures(out, size, progress)
@@ -86,25 +87,14 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     scene.camera = camera
     shoot(scene, out / "before.png")
     progress.update(0.5)
-    switch_off_the_lamps(scene)
-    new_lights(scene)
-    shoot(scene, out / "relit.png")
-    beside(out / "before.png", out / "relit.png", out / "before_after.png")
-
-
-def switch_off_the_lamps(scene) -> None:
-    """Every recovered lamp and the light from outside."""
     for lamp in find_lamps(scene):
         set_on(lamp, False)
-    if scene.world:
-        outside.set_on(scene.world, False)
-
-
-def new_lights(scene) -> None:
-    """The two lights of the relit picture."""
+    outside.set_on(scene.world, False)
     for place, target, tint, power in LIGHTS:
         light = bpy.data.lights.new("Demo light", "AREA")
         light.color, light.energy, light.size = tint, power, 0.5
         thing = bpy.data.objects.new("Demo light", light)
         thing.matrix_world = Matrix(look_at(place, target).tolist())
         scene.collection.objects.link(thing)
+    shoot(scene, out / "relit.png")
+    beside(out / "before.png", out / "relit.png", out / "before_after.png")

@@ -339,4 +339,3 @@ class Names:
                 item.name = name
             except ReferenceError:  # a copy, gone by now
                 continue
-        self._before.clear()

@@ -111,11 +111,6 @@ class Job:
         """Estimate that counts down between the run's own; None while nothing can be said."""
         return None if self._left is None else max(self._left - (time.monotonic() - self._said), 0.0)
 
-    @property
-    def process_id(self) -> int:
-        """The process's number."""
-        return self._process.pid
-
     def stop(self) -> None:
         """Ask for its end, and see to it within `GRACE` seconds; returns at once."""
         if not self.running or self._wished is not None:

@@ -10,9 +10,10 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.io.folder import REPORT, SCENE
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
-from ...core.pipeline.refit import REPORT, Refit, open_result
+from ...core.pipeline.refit import Refit, open_result
 from ...core.pipeline.run import WHOLE, Asked, Run, package_versions, told_in_a_sentence
 from ...core.progress import Progress
 from ...core.results.overrides import OVERRIDES
@@ -25,7 +26,6 @@ from ..data.unwrap import unwrap
 from ..own_scene.capture import polygons_of
 from ..scene.write import write_scene
 
-SCENE = "scene.blend"
 REFIT_WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
 """Rough cost of a refit's parts, for the estimate of the time left."""
 OUTDATED = f"{SCENE} shows the room as it was before objects were fitted again."
@@ -129,8 +129,7 @@ def refit(
 def write_recovered(done: Recovery | Refit, facing: Capture, fresh: bool) -> tuple[str, ...]:
     """Write scene.blend of what was recovered; `facing`: the capture with the mesh that is written."""
     uv, materials, folder = done.surface().shown_uv, done.materials(), done.store.folder
-    how = {"fresh": fresh, "facing": True, "parts": done.parts}
-    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance, **how)
+    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance, fresh, done.parts)
 
 
 def versions() -> dict[str, str]:

@@ -153,7 +153,6 @@ def put_back(material: bpy.types.Material, state: dict) -> None:
     restore(material)
     if not state["touched"]:
         return
-    _keep(material)
     set_factor(material, state["factor"])
     if state["colour"] is not None:
         set_colour(material, state["colour"])

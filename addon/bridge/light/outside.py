@@ -13,9 +13,10 @@ from mathutils import Vector
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.luminance import LUMINANCE
+from ...core.scene.sphere import fibonacci
 from ..data.images import RADIANCE, image_array
 from ..data.nodes import add_node, feed, find_node, make_world
-from .room import bounds, leaves, room_light, sphere
+from .room import bounds, leaves, room_light
 
 RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
@@ -173,7 +174,7 @@ def is_open(scene: bpy.types.Scene) -> bool:
     places = [sum(bounds(scene), Vector()) / 2]
     if scene.camera:
         places.append(scene.camera.matrix_world.translation)
-    return any(leaves(scene, place, direction) for place in places for direction in sphere(128))
+    return any(leaves(scene, place, direction) for place in places for direction in map(Vector, fibonacci(128)))
 
 
 def remarks(scene: bpy.types.Scene) -> list[str]:

@@ -1,7 +1,6 @@
 """What a new light or thing has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import bpy
@@ -18,8 +17,8 @@ from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
-PICTURE = 11
-"""Rays along a side of the picture, where what it shows is looked at."""
+PICTURE = tuple(((k % 11 + 0.5) / 11, (k // 11 + 0.5) / 11) for k in range(11 * 11))
+"""Places of the picture, as `picture_ray` takes them, at which what it shows is looked at."""
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
@@ -69,14 +68,6 @@ def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
             return False
         origin = hit.place + direction.normalized() * 1e-4
     return False
-
-
-def sphere(count: int) -> Iterator[Vector]:
-    """Unit directions, spread evenly over all of them."""
-    for k in range(count):
-        angle, z = math.pi * (3 - math.sqrt(5)) * k, 1 - (2 * k + 1) / count
-        level = math.sqrt(1 - z * z)
-        yield Vector((level * math.cos(angle), level * math.sin(angle), z))
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

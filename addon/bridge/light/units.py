@@ -13,7 +13,6 @@ from .kelvin import luminance
 
 LUMENS_PER_WATT: Unit[float] = 683.0
 ROOM, WATT, LUMEN = "ROOM", "WATT", "LUMEN"
-UNITS = (ROOM, WATT, LUMEN)
 """Of a new light's strength: relative to the light of the room, radiant watts, lumens."""
 
 

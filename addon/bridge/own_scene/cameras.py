@@ -20,6 +20,7 @@ from ..data.cameras import kept_lens
 PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
 """Custom properties of a camera and what they say of its frame; `make_cameras` leaves the first."""
 AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
+_DIGITS = re.compile(r"(\d+)(?!.*\d)")
 
 
 @dataclass(frozen=True)
@@ -30,15 +31,14 @@ class View:
     ----------
     camera : Camera
         In the pixels of the picture; its pose in Blender's units.
-    exposure, saturation : float or None
-        The camera's custom properties of these names; see `core.scene.model.Frame`.
+    told : dict of str to float
+        `exposure` and `saturation`, where the camera's `PROPERTIES` say them; see `core.scene.model.Frame`.
     """
 
     name: str
     camera: Camera
     path: Path
-    exposure: float | None = None
-    saturation: float | None = None
+    told: dict[str, float]
 
 
 def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float = 1.0) -> tuple[float, ...]:
@@ -142,11 +142,11 @@ def views(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     things: list[bpy.types.Object],
+    problems: list[str],
     how: str = AUTO,
     first: int | None = None,
     last: int | None = None,
     step: int = 1,
-    problems: list[str] | None = None,
 ) -> Iterator[View]:
     """Every picture with the camera that took it.
 
@@ -156,15 +156,14 @@ def views(
         With `ANIMATION` its frame is changed; the caller sets it back.
     things : list of bpy.types.Object
         See `cameras_with_pictures`.
+    problems : list of str
+        Gets one sentence for each picture that can't be used.
     how : str
         `OBJECTS`: one frame for each camera. `ANIMATION`: one for each frame of the scene's animation, through the
         active camera, or the only one. `AUTO`: an animation where the one camera has a sequence or a clip behind it.
     first, last, step : int, optional
         Frames of the animation; the scene's where left out.
-    problems : list of str
-        Gets one sentence for each picture that can't be used.
     """
-    problems = [] if problems is None else problems
     if how == AUTO:
         back = background(things[0].data)
         moving = back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")
@@ -180,7 +179,8 @@ def views(
         if moment is not None:
             scene.frame_set(moment)
         for thing in things:
-            name = _plain(thing.name) + ("" if moment is None else f"_{moment:04d}")
+            plain = re.sub(r"[^\w.-]+", "_", thing.name).strip("._") or "camera"  # in a file's name on every system
+            name = plain + ("" if moment is None else f"_{moment:04d}")
             while name.lower() in taken:
                 name += "_"
             try:
@@ -199,7 +199,7 @@ def _view(scene, depsgraph, thing, moment, name) -> View:
         raise BadInputError(f"The background of camera '{thing.name}' is moved, scaled, turned or flipped; reset it.")
     path = picture(back, moment, thing.name)
     camera = camera_of(thing.evaluated_get(depsgraph), read_header(path), frame_size(scene, thing), back.frame_method)
-    return View(name, camera, path, **{name: float(thing[key]) for key, name in PROPERTIES if key in thing})
+    return View(name, camera, path, {told: float(thing[key]) for key, told in PROPERTIES if key in thing})
 
 
 def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> Path:
@@ -243,11 +243,3 @@ def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> P
     if problem:
         raise BadInputError(problem)
     return path
-
-
-_DIGITS = re.compile(r"(\d+)(?!.*\d)")
-
-
-def _plain(name: str) -> str:
-    """`name` as part of a file's name on every system."""
-    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "camera"

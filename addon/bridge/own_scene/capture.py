@@ -20,18 +20,14 @@ from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
 from ...core.io.ply import ply_bytes
-from ...core.kinds import Shown
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
-from ..refused import whole_folder
+from ..refused import MAX_TOLD, sentences, whole_folder
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
-FOLDER = "scene_capture"
-"""Where a result folder keeps the capture that was made of the open scene."""
 OBJECTS, FACES = "scene.json", "faces.npz"
-MAX_TOLD: Shown[int] = 3
 
 
 @dataclass(frozen=True)
@@ -71,8 +67,6 @@ def capture_scene(
 
     Parameters
     ----------
-    context : bpy.types.Context
-        Its scene and view layer.
     folder : Path or str
         Replaced as a whole where an earlier capture of a scene is there.
     things : iterable of bpy.types.Object
@@ -115,7 +109,7 @@ def capture_scene(
     now = scene.frame_current, scene.frame_subframe
     try:
         views = list(
-            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, how, first, last, step, problems)
+            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, problems, how, first, last, step)
         )
     finally:
         if (scene.frame_current, scene.frame_subframe) != now:
@@ -143,21 +137,6 @@ def _doubts(parts: list[Part]) -> tuple[str, ...]:
     )
 
 
-def sentences(*told: tuple[list[str], str]) -> tuple[str, ...]:
-    """One on all objects of which the same is to be said, by their names; none where there are none."""
-    return tuple(f"{few(names)}: {what}." for names, what in told if names)
-
-
-def few(names: list[str]) -> str:
-    """The objects of these names, for a sentence: the first ones, and how many more."""
-    shown = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
-    return (
-        f"Objects {shown} and {len(names) - MAX_TOLD} more"
-        if len(names) > MAX_TOLD
-        else f"Object{'s' if len(names) > 1 else ''} {shown}"
-    )
-
-
 def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_cameras.View], metre: float) -> None:
     (folder / "mesh.ply").write_bytes(ply_bytes(mesh.vertices * metre, [(mesh.triangles, mesh.object_id)]))
     names = [{"id": part.object_id, "class_name": part.class_name, "name": part.name} for part in parts]
@@ -172,8 +151,7 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
         frame |= {"cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
         if camera.lens is not None:
             frame[OWN_LENS] = told_lens(camera.lens)
-        known = {key: getattr(view, key) for key in ("exposure", "saturation")}
-        frames.append(frame | {key: value for key, value in known.items() if value is not None})
+        frames.append(frame | view.told)
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     told = [
         Source(one.object_id, one.name, one.thing.name, one.own, one.topology, mesh.corner_start[one.object_id])

@@ -22,10 +22,10 @@ from ..data.materials import MODEL, make_material
 from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
 from ..marks import OBJECT_ID, RESULT, RUN, mark
+from ..refused import sentences
 from ..results import images
-from .capture import Source, check_own, polygons_of, sentences, sources
-from .mesh import Part, gather, same_topology
-from .mesh import topology_hash as hash_of
+from .capture import Source, check_own, polygons_of, sources
+from .mesh import Part, gather, same_topology, topology_hash
 
 BEFORE = "scan_relight_before"
 """Custom property of an object: what it wore before."""
@@ -101,7 +101,7 @@ def writing_back(
         own = corner_uv[source.corner_start :]
         if not source.own:
             made.append((source, thing, description, own))
-        elif thing.type != "MESH" or hash_of([faces_of(thing.data)]) != source.topology:
+        elif thing.type != "MESH" or topology_hash([faces_of(thing.data)]) != source.topology:
             edited.append(source.name)
         else:
             work.dress(thing, source, description, own[: len(thing.data.loops)])
@@ -197,7 +197,7 @@ class _Work:
             data = bpy.data.meshes.new_from_object(
                 thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
             )
-            if hash_of([faces_of(data)]) != part.topology:  # its one piece is an instance
+            if topology_hash([faces_of(data)]) != part.topology:  # its one piece is an instance
                 bpy.data.meshes.remove(data)
                 data = None
         if data is None:
@@ -238,7 +238,7 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
         worn = [slot.material for slot in thing.material_slots]
         if before.get("mesh") is not None:
             ours, thing.data = thing.data, before["mesh"]
-            if not same_shape(ours, thing.data):
+            if not (same_topology(ours, thing.data) and np.array_equal(vertices_of(ours), vertices_of(thing.data))):
                 edited.append(thing.name)
                 ours.use_fake_user = True
             elif not ours.users:
@@ -291,11 +291,6 @@ def undo_copies(thing: bpy.types.Object) -> None:
         drop_ours(worn)
     thing.hide_viewport, thing.hide_render = bool(before["hide_viewport"]), bool(before["hide_render"])
     del thing[BEFORE]
-
-
-def same_shape(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
-    """Whether two meshes have the same faces and vertices at the same places."""
-    return same_topology(one, other) and np.array_equal(vertices_of(one), vertices_of(other))
 
 
 def drop_ours(materials: Iterable[bpy.types.Material | None]) -> None:

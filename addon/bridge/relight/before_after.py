@@ -13,8 +13,8 @@ import bpy
 
 from ...core.atomic import TEMPORARY
 from ...core.errors import BadInputError
+from ...core.io.folder import MATERIALS, SCENE
 from ...core.progress import Progress
-from ...core.results.room_file import MATERIALS
 from ..marks import RESULT
 from ..refused import refused
 from .pictures import beside, check_format, seconds_expected, shoot, ticking
@@ -22,8 +22,6 @@ from .setup import captured_light
 
 NAME = "Before and After"
 """Name of the image in Blender."""
-COPY = "scene.blend"
-WEIGHTS = {"before": 1, "after": 1}
 
 
 def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
@@ -80,7 +78,7 @@ def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool
 def save_copy(folder: Path) -> None:
     """Save what is open as a copy that the command `relight` can open; what is open stays as it is."""
     with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
-        bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), copy=True, compress=False, relative_remap=True)
 
 
 def show(path: Path) -> bpy.types.Image:

@@ -7,13 +7,13 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.io.folder import SCENE
 from ...core.progress import Progress
 from ..data.cameras import frame_cameras, use_camera
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import rgb_of
 from ..render_device import use_device
-from .before_after import COPY as SCENE
 from .before_after import render_pair
 from .lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
 from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking
@@ -32,7 +32,7 @@ class Light:
     hdri : Path or None
         Picture to put around the room.
     added : dict of str to (float, str)
-        Strength of each new light and its unit (`light.units.UNITS`), by `relight.lights.PRESETS`.
+        Strength of each new light and its unit (`light.units.ROOM` and its neighbours), by `relight.lights.PRESETS`.
     kelvin : float or None
         Temperature of the new lights; None: what suits each.
     """
@@ -62,8 +62,6 @@ def relight(
 
     Parameters
     ----------
-    result : Path
-        A result folder.
     out : Path
         Ends in .png, .jpg or .exr.
     camera : str, optional

@@ -16,11 +16,12 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.scene.sphere import fibonacci
 from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
-from ..light.room import PICTURE, bounds, cast, leaves, picture_ray, sphere
+from ..light.room import PICTURE, bounds, cast, leaves, picture_ray
 from ..light.units import LUMENS_PER_WATT, efficacy
 
 _AROUND, _ON_LAMP = 64, 6
@@ -113,12 +114,11 @@ def _rounded(thing) -> tuple:
 
 def _places(scene) -> tuple[list, int, np.ndarray]:
     """The first fields of `Known`; no place is on a lamp."""
-    corners = [(k + 0.5) / PICTURE for k in range(PICTURE)]
-    rays = [picture_ray(scene, x, y) for y in corners for x in corners]
+    rays = [picture_ray(scene, *place) for place in PICTURE]
     seen = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):
-        for direction in sphere(_AROUND):
+        for direction in map(Vector, fibonacci(_AROUND)):
             hit = cast(scene, start, direction)
             if hit is not None and not _is_lamp(hit.thing):
                 hits.append(hit)

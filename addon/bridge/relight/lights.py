@@ -65,7 +65,7 @@ def add_light(
     kelvin : float, optional
         Temperature of its colour; by default the preset's in `KELVIN`.
     unit : str
-        Of `light.units.UNITS`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable.
+        Of `light.units`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable.
 
     Raises
     ------

@@ -24,6 +24,8 @@ FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8
 CYCLES, EEVEE = "CYCLES", "EEVEE"
 _SLOT = "Scan Relight"
 """Name of the slot of Blender's Render Result for pictures that only measure something."""
+_SMALL = 64
+"""Pixels of their width."""
 _RENDER = (
     "engine filepath resolution_x resolution_y resolution_percentage pixel_aspect_x pixel_aspect_y film_transparent "
     "use_border use_file_extension use_compositing use_sequencer use_overwrite use_placeholder"
@@ -128,15 +130,15 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
             )
 
 
-def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
+def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16) -> float:
     """Median luminance of a small picture through the scene's camera, linear; the scene's settings stay."""
     from ...core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
 
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
         prepare(scene, engine, samples)
         render = scene.render
-        render.resolution_y = max(round(width * render.resolution_y / render.resolution_x), 8)
-        render.resolution_x, render.resolution_percentage = width, 100
+        render.resolution_y = max(round(_SMALL * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = _SMALL, 100
         if engine == CYCLES:
             scene.cycles.use_denoising = False
         shoot(scene, Path(folder) / "small.exr")
@@ -216,19 +218,14 @@ def beside(left: Path, right: Path, out: Path) -> None:
     images = [bpy.data.images.load(str(Path(path).absolute())) for path in (left, right)]
     pixels = [image_array(image) for image in images]
     gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
-    joined = np.concatenate([_rgba(pixels[0]), gap, _rgba(pixels[1])], 1)
+    joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
+    joined[..., 3] = 1.0
     kind = FORMATS[check_format(out)][0]
     made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0], float_buffer=kind == "OPEN_EXR")
     try:
-        made.pixels.foreach_set(joined.astype(np.float32).ravel())
+        made.pixels.foreach_set(joined.ravel())
         with saving(Path(out)) as temporary:
             made.filepath_raw, made.file_format = str(temporary.absolute()), kind
             made.save()
     finally:
         bpy.data.batch_remove([*images, made])
-
-
-def _rgba(pixels: np.ndarray) -> np.ndarray:
-    out = np.ones((*pixels.shape[:2], 4), np.float32)
-    out[..., :3] = pixels[..., :3]
-    return out

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from itertools import product
 
 import bpy
 import numpy as np
@@ -84,8 +83,7 @@ def subject_of(scene: bpy.types.Scene, aim: str, thing: bpy.types.Object | None 
 def _seen(scene) -> dict[Hit, float]:
     """What a grid of the picture's rays meets, and how much each counts: the middle more than the rim."""
     found: dict[Hit, float] = {}
-    steps = [(k + 0.5) / PICTURE for k in range(PICTURE)]
-    for y, x in product(steps, steps) if scene.camera is not None else ():
+    for x, y in PICTURE if scene.camera is not None else ():
         hit = cast(scene, *picture_ray(scene, x, y))
         if hit is not None and OBJECT_ID in hit.thing:
             found[hit._replace(place=hit.place.freeze(), normal=hit.normal.freeze())] = math.exp(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import bmesh
 import bpy
@@ -134,21 +134,19 @@ def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None
 
 
 @contextmanager
-def _hidden(thing: bpy.types.Object | None) -> Iterator[None]:
+def _hidden(thing: bpy.types.Object) -> Iterator[None]:
     """Within: no ray meets an object."""
-    hidden = thing is not None and thing.hide_viewport
+    hidden = thing.hide_viewport
     try:
-        if thing is not None:
-            thing.hide_viewport = True
+        thing.hide_viewport = True
         yield
     finally:
-        if thing is not None:
-            thing.hide_viewport = hidden
+        thing.hide_viewport = hidden
 
 
 def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = None) -> Hit:
     """The surface to stand on that is nearest the picture's middle, else below the 3D cursor or the room's middle."""
-    with _hidden(ignored):
+    with _hidden(ignored) if ignored is not None else nullcontext():
         low, high = bounds(scene)
         starts = [scene.cursor.location + Vector((0, 0, 0.05)), (low + high) / 2]
         if scene.camera:

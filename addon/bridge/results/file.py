@@ -12,10 +12,10 @@ from typing import Any
 import bpy
 
 from ...core.brdf.material import renamed
+from ...core.io.folder import MATERIALS, REPORT
 from ..data.materials import MODEL
 from ..marks import OBJECT_ID, RESULT, RUN
 
-MATERIALS, REPORT = "materials.json", "report.json"
 FITS, EARLIER, UNTOLD, GONE = "FITS", "EARLIER", "UNTOLD", "GONE"
 """How an object stands to the result that it came from: it is of the run that lies there; of another one; it can't be
 told, as the object or the folder is older than runs' keys; or there is no result any more."""

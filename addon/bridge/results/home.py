@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.io.folder import SCENE
 from ...core.results.place import BESIDE, HOME, captures, documents, free_folder, own_folder
 from ..marks import CAPTURE, RESULT
 
@@ -97,6 +98,6 @@ def _of_room(scene: bpy.types.Scene, capture: Path) -> Path | None:
             continue
         folder = Path(told)
         open_file = Path(bpy.data.filepath) if bpy.data.filepath else None
-        if capture in captures(folder) and not is_ours(folder) and open_file != folder / "scene.blend":
+        if capture in captures(folder) and not is_ours(folder) and open_file != folder / SCENE:
             return folder
     return None

@@ -36,12 +36,7 @@ BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
 
 def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
-    """Load the baked images (`BAKED`); what an earlier call loaded of this folder is taken again and renewed.
-
-    Returns
-    -------
-    bpy.types.Image or None
-        The one that Base Color shows.
+    """Load the baked images (`BAKED`), in place of an earlier call's; returns the one that Base Color shows.
 
     Raises
     ------

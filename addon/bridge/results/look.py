@@ -106,7 +106,7 @@ def result_of(scene: bpy.types.Scene) -> Path | None:
     return next((Path(one) for one in told if one and Path(one).is_dir()), None)
 
 
-def set_look(scene: bpy.types.Scene, look: str) -> int:
+def set_look(scene: bpy.types.Scene, look: str) -> None:
     """Let the viewport show a look on all recovered objects, each from the result that it came from.
 
     Objects of another run than lies in their folder now are left out: the images would not fit them.
@@ -116,11 +116,6 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
     look : str
         One of `LOOKS`.
 
-    Returns
-    -------
-    int
-        How many objects show it.
-
     Raises
     ------
     BadInputError
@@ -128,7 +123,9 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
         stays as it was.
     """
     if look == MATERIAL:
-        return clear(scene)
+        _take_off(scene.objects)
+        _sweep()
+        return
     things = recovered(scene)
     if not things:
         raise BadInputError("No object of this scene wears recovered materials; run the recovery first.")
@@ -146,33 +143,23 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
     except BadInputError:
         _sweep()
         raise
-    clear(scene, groups.values())
+    _take_off(scene.objects)
+    _sweep(groups.values())
     for thing, folder in folders.items():
         modifier = thing.modifiers.new(NAME, "NODES")
         modifier.node_group = groups[folder]
         modifier.show_render = modifier.show_expanded = False
-    return len(folders)
 
 
-def clear(scene: bpy.types.Scene, but: Iterable[bpy.types.NodeTree] = ()) -> int:
-    """Let the viewport show the materials themselves, keeping node groups `but`; how many objects showed others."""
-    count = _take_off(scene.objects)
-    _sweep(but)
-    return count
-
-
-def _take_off(things: Iterable[bpy.types.Object]) -> int:
-    count = 0
+def _take_off(things: Iterable[bpy.types.Object]) -> None:
     for thing in things:
         modifier = thing.modifiers.get(NAME)
         if modifier is not None and not thing.library:
             thing.modifiers.remove(modifier)
-            count += 1
-    return count
 
 
 def _sweep(but: Iterable[bpy.types.NodeTree] = ()) -> None:
-    """Remove what earlier looks left: groups, materials and images that nothing uses."""
+    """Remove what earlier looks left: groups other than `but`, materials and images that nothing uses."""
     for group in [one for one in bpy.data.node_groups if MARK in one and not one.users and not one.library]:
         if group not in but:
             bpy.data.node_groups.remove(group)

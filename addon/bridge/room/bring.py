@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError, MissingStageError
+from ...core.io.folder import SCENE
 from ...core.results.room_file import ROOM, root_of, run_of
 from ..data.added import Made
 from ..data.cameras import show_camera
@@ -21,9 +22,6 @@ from ..scene.as_made import stamp, stamp_tree
 from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, rooms, scene_name, take_settings
 from .update import commit, note_known, plan
 
-SCENE_FILE = "scene.blend"
-__all__ = ["Brought", "bringing", "link_room", "rooms"]
-
 
 @dataclass(frozen=True)
 class Brought:
@@ -33,21 +31,13 @@ class Brought:
     ----------
     scene : bpy.types.Scene
         Where the room is to be seen: the scene that was named, or the room's own.
-    collection : bpy.types.Collection
-        The room's.
-    updated : bool
-        It was in the file already.
     warnings : tuple of str
         What was left as the artist has it, one sentence each.
-    changes : tuple of dict
-        Objects that were found to be notably different from last time: `object_id`, `name` and `text`, the sentence.
     """
 
     scene: bpy.types.Scene
     collection: bpy.types.Collection
-    updated: bool = False
     warnings: tuple[str, ...] = ()
-    changes: tuple[dict, ...] = ()
 
 
 def bringing(
@@ -90,7 +80,7 @@ def bringing(
     made = Made()
     try:
         yield 0.0
-        shell = _append(folder / SCENE_FILE)
+        shell = _append(folder / SCENE)
         yield 0.4
         fresh = next(iter(rooms(shell)), shell.collection.children[0])  # an older one is not marked
         run = run_of(folder)
@@ -131,10 +121,9 @@ def bringing(
     made.remove_unused(steps.replaced if steps is not None else ())
     for one, label in steps.names if steps is not None else ():
         one.name = label
-    brought = Brought(place, top, steps is not None, (*warnings, *kept), differences)
     yield 0.98
     ready(place)
-    return brought
+    return Brought(place, top, (*warnings, *kept))
 
 
 def ready(scene: bpy.types.Scene) -> None:
@@ -200,8 +189,6 @@ def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.ty
 
     Parameters
     ----------
-    top : bpy.types.Collection
-        The room's.
     outside : bpy.types.Scene, optional
         Give `scene` the world and the exposure of this one, too.
     """

@@ -34,7 +34,7 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
         if scene is not None:
             link_room(top, scene)
         told = f"Capture '{capture.root.name}' is in this file already, in its scene '{known.name}'; it stays as it is."
-        return Brought(scene or known, top, True, (told,))
+        return Brought(scene or known, top, (told,))
     made = Made()
     try:
         top = new_room(capture.root)

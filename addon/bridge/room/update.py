@@ -15,8 +15,8 @@ from ..data.cameras import FRAME_INDEX, NO_FRAME
 from ..data.mesh_objects import ATLAS_UV
 from ..light import lamps as relight_lamps
 from ..marks import CAPTURE, OBJECT_ID, RESULT, RUN
-from ..own_scene.capture import sentences
 from ..own_scene.mesh import same_topology
+from ..refused import sentences
 from ..scene.as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours, is_renamed, made_at
 from ..scene.parts import LAMPS, PART, ROOM, part_of
 
@@ -243,8 +243,7 @@ def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
         steps.replaced.append(animated.action.session_uid)
         steps.names.append((new.animation_data.action, animated.action.name))
     animated.action = new.animation_data.action
-    if hasattr(animated, "action_slot"):
-        animated.action_slot = new.animation_data.action_slot
+    animated.action_slot = new.animation_data.action_slot
 
 
 def atlas_onto(data: bpy.types.Mesh, place: Matrix, source: bpy.types.Mesh, source_place: Matrix) -> None:

@@ -7,6 +7,7 @@ import bpy
 from ...core.errors import MissingStageError
 from ..light import outside
 from ..marks import CAPTURE, OWN_SCENE
+from ..render_device import preferences_of_cycles
 from .as_made import WRITTEN, is_corrected
 
 ROOM, LAMPS, CAMERAS = "Room", "Lamps", "Cameras"
@@ -48,8 +49,7 @@ def scene_name(capture_folder: Path | str) -> str:
 
 def part_of(top: bpy.types.Collection, name: str) -> bpy.types.Collection:
     """One of a room's parts; the room's own collection where the artist took it away."""
-    found = [part for part in top.children_recursive if part.get(PART, part.name.split(".")[0]) == name]
-    return found[0] if found else top
+    return next((part for part in top.children_recursive if part.get(PART, part.name.split(".")[0]) == name), top)
 
 
 def rooms(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
@@ -98,20 +98,13 @@ _RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "p
 def dress(scene: bpy.types.Scene) -> None:
     """Prepare a room's own scene for this artist: her graphics card, a viewport that calms down quickly."""
     scene[EXPOSURE] = scene.view_settings.exposure
-    addon = bpy.context.preferences.addons.get("cycles")
-    card = addon is not None and addon.preferences is not None and addon.preferences.has_active_device()
-    scene.cycles.device = "GPU" if card else "CPU"
+    preferences = preferences_of_cycles()
+    scene.cycles.device = "GPU" if preferences is not None and preferences.has_active_device() else "CPU"
     scene.cycles.use_preview_denoising = True
 
 
 def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:
-    """Bring a room's own scene up to date with the scene of a new result; what the artist changed stays.
-
-    Returns
-    -------
-    list of str
-        One sentence on each thing that stays hers.
-    """
+    """Bring a room's own scene up to date with a new result's; a sentence on each thing that stays the artist's."""
     kept = []
     if EXPOSURE not in scene:  # the capture was imported, no more
         for name in _RENDER:

@@ -1,11 +1,10 @@
-"""The recovered room as a Blender scene: built into any scene, or saved as a file that renders when opened."""
+"""The recovered room as a Blender scene, saved as a file that renders when opened."""
 
 import errno
 import math
 import os
 from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import dataclass, field
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,17 +13,18 @@ import numpy as np
 
 from ...core.brdf.emitter import EMITTER
 from ...core.brdf.material import ObjectMaterial, undescribed
+from ...core.io.folder import SCENE
 from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import openings_of, run_of
 from ...core.scene.model import Capture
-from ..data.added import Made
+from ..data.added import scene_apart
 from ..data.arrays import make_mesh
 from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import let_light_through, make_material
 from ..data.mesh_objects import each_object, is_open
-from ..data.nodes import set_world
+from ..data.nodes import make_world
 from ..marks import OWN_SCENE, mark
 from ..refused import refused
 from .as_made import stamp, stamp_tree
@@ -36,72 +36,23 @@ if TYPE_CHECKING:
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
 """Files of the result folder that the scene shows; a missing one is left out."""
 _WRITING = ".scene-being-written.blend"
-SCENE_FILES = "scene.blend", _WRITING
+SCENE_FILES = SCENE, _WRITING
 """A result's own file of its room; what it is called while it is written."""
 
 
-@dataclass
-class BuiltScene:
-    """What `build_scene` made.
-
-    Attributes
-    ----------
-    collection : bpy.types.Collection
-        "Scan Relight", linked to the scene; within it "Room", "Lamps" and "Cameras".
-    objects : dict of int to bpy.types.Object
-        By `object_id`.
-    cameras : list of bpy.types.Object
-        In the capture's order.
-    images : list of bpy.types.Image
-        All that refer to files of the result folder.
-    """
-
-    collection: bpy.types.Collection
-    objects: dict[int, bpy.types.Object]
-    cameras: list[bpy.types.Object]
-    images: list[bpy.types.Image] = field(default_factory=list)
-    warnings: tuple[str, ...] = ()
-
-
-def build_scene(
+def _build(
     scene: bpy.types.Scene,
     capture: Capture,
     atlas_uv: np.ndarray,
     materials: Iterable[ObjectMaterial],
-    result_folder: Path | str,
-    median_radiance: float = 0.0,
-    own: bool = False,
-    facing: bool = False,
-    parts: "Parts | None" = None,
-) -> BuiltScene:
-    """Add the recovered room to a scene as a new collection; nothing that is there is changed.
-
-    Parameters
-    ----------
-    atlas_uv : (t, 3, 2) float32
-        What `unwrap` gave.
-    materials : iterable of ObjectMaterial
-        An instance without one becomes lambertian.
-    result_folder : Path or str
-        Holds the images, see `BASE_COLOR` and its neighbours.
-    median_radiance : float
-        Of the frames; with `own` it sets the exposure so that this becomes middle grey. 0: unknown.
-    own : bool
-        The scene is ours: also set its world, active camera, render engine and exposure.
-    facing : bool
-        The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
-    parts : Parts, optional
-        Images that the materials show instead of the room's one; that is there all the same.
-
-    Raises
-    ------
-    BadInputError
-        An image of the result folder can't be read.
-    """
-    folder = Path(result_folder).absolute()
+    folder: Path,
+    median_radiance: float,
+    parts: "Parts | None",
+) -> tuple[list[bpy.types.Image], tuple[str, ...]]:
+    """Make an empty scene that of the room; returns the images that it refers to, and warnings."""
     images = {
-        name: load_image(folder / name, image_name(capture.root.name, name))
-        for name in (BASE_COLOR, ALBEDO, SHADING)
+        name: load_image(folder / name, image_name(capture.root.name, name), keep=name != ENVIRONMENT)
+        for name in (BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT)
         if (folder / name).exists()
     }
     top = new_room(capture.root)
@@ -118,7 +69,7 @@ def build_scene(
             continue
         thing = objects[instance.object_id]
         description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
-        one_sided = facing and description.model.gives_light and is_open(thing.data)
+        one_sided = description.model.gives_light and is_open(thing.data)
         base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
         thing.data.materials.append(make_material(description, base_color, one_sided=one_sided))
         if description.model.gives_light:
@@ -128,26 +79,19 @@ def build_scene(
     panels = make_openings(folder, lamps)
     cameras = make_cameras(capture.frames, eyes)
     track = make_track(cameras, eyes)
-    if own:
-        environment = folder / ENVIRONMENT
-        world = set_world(scene, environment if environment.exists() else None)
-        for node in world.node_tree.nodes:
-            if node.type == "TEX_ENVIRONMENT":
-                node.image.name = image_name(capture.root.name, ENVIRONMENT)
-                images[node.name] = node.image
-        _prepare(scene, median_radiance)
-        stamp_tree(world)
-        use_camera(scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, eyes))
-        scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
-        scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
-        scene[EXPOSURE] = scene.view_settings.exposure
+    scene.world = make_world("Scan Relight", images.get(ENVIRONMENT))
+    stamp_tree(scene.world)
+    _prepare(scene, median_radiance)
+    use_camera(scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, eyes))
+    scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
+    scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
+    scene[EXPOSURE] = scene.view_settings.exposure
     for thing in (*panels, *cameras, *filter(None, (track,))):
         mark(thing, folder, run, capture.root)
         stamp(thing)
     hide_cameras(scene, top)
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
-    shown = [*images.values(), *dict.fromkeys(own_images.values())]
-    return BuiltScene(top, objects, cameras, shown, warnings)
+    return [*images.values(), *dict.fromkeys(own_images.values())], warnings
 
 
 def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -183,8 +127,7 @@ def write_scene(
     materials: Iterable[ObjectMaterial],
     result_folder: Path | str,
     median_radiance: float = 0.0,
-    fresh: bool | None = None,
-    facing: bool = False,
+    fresh: bool = True,
     parts: "Parts | None" = None,
 ) -> tuple[str, ...]:
     """Save the recovered room as a .blend of its own that renders when opened.
@@ -195,11 +138,21 @@ def write_scene(
     ----------
     path : Path or str
         Best within `result_folder`, so that both are moved together.
-    capture, atlas_uv, materials, result_folder, median_radiance, facing, parts
-        See `build_scene`.
-    fresh : bool, optional
-        True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
-        that part alone and take it away again. By default fresh in background mode only.
+    capture : Capture
+        The mesh's normals face the frames: a lamp that is an open sheet shines on that side only, as it was seen.
+    atlas_uv : (t, 3, 2) float32
+        What `unwrap` gave.
+    materials : iterable of ObjectMaterial
+        An instance without one becomes lambertian.
+    result_folder : Path or str
+        Holds the images, see `BASE_COLOR` and its neighbours.
+    median_radiance : float
+        Of the frames; the exposure is set so that this becomes middle grey. 0: unknown.
+    fresh : bool
+        Start from an empty file; what is open in this process is lost. False: build next to what is open, save that
+        part alone and take it away again.
+    parts : Parts, optional
+        Images that the materials show instead of the room's one; that is there all the same.
 
     Returns
     -------
@@ -214,44 +167,35 @@ def write_scene(
         The file can't be written.
     """
     path = Path(path).absolute()
-    fresh = bpy.app.background if fresh is None else fresh
     if fresh:
         # Not read_factory_settings: that would disable the running extension itself.
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        scene = bpy.context.scene
-        scene.name = "Scan Relight"
-    else:
-        made = Made()
-        scene = bpy.data.scenes.new("Scan Relight")
-    try:
-        built = build_scene(
-            scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True, facing=facing, parts=parts
+    with nullcontext((bpy.context.scene, None)) if fresh else scene_apart("Scan Relight") as (scene, _):
+        images, warnings = _build(
+            scene, capture, atlas_uv, materials, Path(result_folder).absolute(), median_radiance, parts
         )
-        for image in built.images:
+        for image in images:
             relative_to(image, path.parent)
-        _save_whole(path, scene, built, fresh)
-    finally:
-        if not fresh:
-            made.remove()
-    return built.warnings
+        _save_whole(path, scene, images, fresh)
+    return warnings
 
 
-def _save(name, scene, built, fresh):
+def _save(name, scene, images, fresh):
     if fresh:
         bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
     else:
         # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
         scene.view_layers[0].update()
-        bpy.data.libraries.write(name, {scene, *built.images}, path_remap="NONE", compress=True, fake_user=False)
+        bpy.data.libraries.write(name, {scene, *images}, path_remap="NONE", compress=True, fake_user=False)
 
 
-def _save_whole(path: Path, scene: bpy.types.Scene, built: BuiltScene, fresh: bool) -> None:
+def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image], fresh: bool) -> None:
     writing = path.parent / _WRITING
     try:
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             writing.unlink(missing_ok=True)
-            _save(str(writing), scene, built, fresh)
+            _save(str(writing), scene, images, fresh)
             try:  # Blender does not notice a full disk while it compresses, but it does when it reads
                 with bpy.data.libraries.load(str(writing)):
                     pass

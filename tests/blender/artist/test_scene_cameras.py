@@ -149,7 +149,7 @@ def test_an_animation_with_a_sequence(scene, animated, tmp_path):
 
 def test_frames_beyond_the_sequence_are_told(scene, animated):
     problems = []
-    found = list(views(scene, bpy.context.evaluated_depsgraph_get(), [animated], ANIMATION, 4, 7, problems=problems))
+    found = list(views(scene, bpy.context.evaluated_depsgraph_get(), [animated], problems, ANIMATION, 4, 7))
     assert len(found) == 2 and problems == [
         "Camera 'camera' has no picture at frame 6.",
         "Camera 'camera' has no picture at frame 7.",

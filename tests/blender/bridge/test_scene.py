@@ -19,7 +19,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.room.bring import bringing  # noqa: E402
 from addon.bridge.scene import write as bridge_scene  # noqa: E402
-from addon.bridge.scene.write import build_scene, write_scene  # noqa: E402
+from addon.bridge.scene.write import write_scene  # noqa: E402
 
 KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
 
@@ -149,16 +149,6 @@ def test_the_open_file_is_left_alone(scene, result, capture):
     before, world = counts(), scene.world
     write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, fresh=False)
     assert counts() == before and bpy.context.scene == scene and scene.world == world and bpy.data.filepath == ""
-
-
-def test_building_into_the_users_scene_adds_one_collection(scene, result, capture):
-    bpy.ops.mesh.primitive_cube_add()
-    cube, engine, exposure = bpy.context.object, scene.render.engine, scene.view_settings.exposure
-    built = build_scene(scene, capture, ATLAS, MATERIALS, result, 0.01)
-    assert {c.name for c in scene.collection.children} == {"Scan Relight"} and cube.name in scene.collection.objects
-    assert scene.world is None and scene.camera is None and scene.render.engine == engine
-    assert scene.view_settings.exposure == exposure and bpy.context.object == cube
-    assert sorted(built.objects) == [4, 9] and len(built.cameras) == 2
 
 
 def test_images_that_are_missing_are_left_out(scene, tmp_path, capture):

@@ -12,7 +12,7 @@ from addon.core.scene.model import Camera, Frame
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.data.cameras import make_cameras, use_camera  # noqa: E402
-from addon.bridge.data.nodes import set_world  # noqa: E402
+from tests.blender.conftest import set_world  # noqa: E402
 
 
 def looking(direction):

@@ -99,7 +99,7 @@ def test_a_deaf_job_is_ended():
     job = Job(python(DEAF))
     job.stop()
     job.stop()  # a second wish changes nothing
-    assert job.wait(30) and job.state == STOPPED and not alive(job.process_id)
+    assert job.wait(30) and job.state == STOPPED and not alive(job._process.pid)
 
 
 def test_there_is_one_current_run():
@@ -117,7 +117,7 @@ def test_there_is_one_current_run():
 def test_end_all_leaves_none():
     some = [Job(python(DEAF)) for _ in range(2)]
     jobs.end_all()
-    assert all(one.wait(30) and not alive(one.process_id) for one in some)
+    assert all(one.wait(30) and not alive(one._process.pid) for one in some)
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def test_a_job_ends_with_its_starter(grey_capture, tmp_path):
         "import json, os, sys, time\nfrom addon.bridge.job.job import Job\nimport bpy\n"
         "job = Job(json.loads(sys.argv[1]))\n"
         "while not job.stage: time.sleep(0.02)\n"
-        "print(job.process_id, flush=True)\nos.kill(os.getpid(), 9)"
+        "print(job._process.pid, flush=True)\nos.kill(os.getpid(), 9)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, json.dumps(recover(grey_capture, tmp_path))], capture_output=True, text=True

@@ -15,7 +15,6 @@ from addon.bridge.data.arrays import make_mesh  # noqa: E402
 from addon.bridge.data.images import image_array, load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV  # noqa: E402
-from addon.bridge.data.nodes import set_world  # noqa: E402
 from addon.bridge.export import export as exporting  # noqa: E402
 from addon.bridge.light import lamps  # noqa: E402
 from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
@@ -28,6 +27,7 @@ from addon.core.brdf.metal import METAL  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
 from addon.core.photo import encoded  # noqa: E402
+from tests.blender.conftest import set_world  # noqa: E402
 
 COLOUR = (0.5, 0.1, 0.02)
 UV = np.float32([[0.1, 0.1], [0.9, 0.1], [0.9, 0.8]])
@@ -333,7 +333,7 @@ def test_an_object_takes_its_tile_along(things, tmp_path, packed):
     colours = {1001: (0.1, 0.2, 0.3), 1012: (0.6, 0.5, 0.4)}
     for number, colour in colours.items():
         write_exr(tmp_path / f"tiles.{number}.exr", np.broadcast_to(np.float32(colour), (8, 8, 3)))
-    tiled = load_image(tmp_path / "tiles.<UDIM>.exr", "kitchen tiles", packed=packed)
+    tiled = load_image(tmp_path / "tiles.<UDIM>.exr", "kitchen tiles")
     tiled[UV_MAP] = PARTS_UV
     for name, number in (("wall 1", 1001), ("table 2", 1012)):
         data = things.objects[name].data
@@ -343,6 +343,7 @@ def test_an_object_takes_its_tile_along(things, tmp_path, packed):
         layer.active_render = True
         data.materials[0] = make_material(KNOWN[int(name[-1]) - 1], tiled)
     if packed:
+        tiled.pack()
         for number in colours:
             (tmp_path / f"tiles.{number}.exr").unlink()
     exporting.export(things, tmp_path / "out" / "room.glb")

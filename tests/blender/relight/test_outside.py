@@ -7,10 +7,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.data.nodes import set_world  # noqa: E402
 from addon.bridge.light import outside as outside  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
+from tests.blender.conftest import set_world  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 
 
