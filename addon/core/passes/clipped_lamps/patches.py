@@ -1,13 +1,15 @@
 """Patches that the sensor clipped or that are far brighter than the rest, of a mesh that tells of no objects.
 
 In a fused mesh ceiling lamps and windows are of one piece with the rest. What nearly all frames
-that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none.
+that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none,
+nor is what fades out: light that falls onto a surface, and highlights on it, do so, but a lamp ends at its rim.
 Of what is bright and not clipped the radiance is known.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
@@ -32,10 +34,17 @@ class PatchParams:
     bright : float
         Times the median radiance of the surface that an element must send to be of a patch unclipped. Sunlight on a
         floor is some ten to twenty times as bright as a room, a lamp some hundred times.
+    beside : tuple of float
+        Texels off a patch between which the surface around it lies; nearer, poses that are off mix the two.
+    fades : float
+        Times a patch's median radiance that what lies around it sends where the patch is lit and no lamp. Five rooms as
+        a phone gives them: .15 to .43 around lamps, .7 to 1.25 around what lamps light, .1 to .55 around sunlight.
     """
 
     core: float = 0.9
     bright: float = 40.0
+    beside: tuple[float, float] = (4.0, 6.0)
+    fades: float = 0.5
 
 
 PATCHES = PatchParams()
@@ -65,12 +74,29 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     core = np.bincount(of_element[own & (apart > PATCHES.core)], minlength=parts)
     area = np.bincount(of_element[own], atlas.area[own], parts)
     enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
-    kept = enough[np.argsort(-area[enough], kind="stable")][: LEVELS.most]
+    enough = enough[np.argsort(-area[enough], kind="stable")]
+    kept = np.array([one for one in enough if not _fades(atlas, lit, of_element, one)][: LEVELS.most], int)
     first = int(mesh.object_id.max()) + 1
     number = np.full(parts, -1)
     number[kept] = first + np.arange(len(kept))
     triangle = np.flatnonzero(np.where(label >= 0, number[label], -1) >= 0)
     return Patches(triangle.astype(np.int32), number[label[triangle]].astype(np.int32))
+
+
+def _fades(atlas: Atlas, lit: LitDiffuse, patch: np.ndarray, one: int) -> bool:
+    """Whether `one` of the patches ((n,) int of each element, -1 for none) is about as bright as what is around it."""
+    own = np.flatnonzero((patch == one) & lit.seen)
+    near, far = np.multiply(PATCHES.beside, atlas.texel_edge)
+    place, normal = atlas.position[own], atlas.normal[own].mean(0)
+    others = np.flatnonzero((patch < 0) & lit.seen & (atlas.normal @ normal > 0.9 * np.linalg.norm(normal)))
+    within = ((atlas.position[others] > place.min(0) - far) & (atlas.position[others] < place.max(0) + far)).all(1)
+    others = others[within]
+    away, _ = cKDTree(place).query(atlas.position[others], distance_upper_bound=far)
+    around = others[(away > near) & np.isfinite(away)]
+    if len(around) < LEVELS.few:
+        return False
+    sent, beside = (float(np.median(lit.radiance[which] @ LUMINANCE)) for which in (own, around))
+    return beside > PATCHES.fades * sent
 
 
 def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:

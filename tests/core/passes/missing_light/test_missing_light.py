@@ -22,7 +22,7 @@ from addon.core.scene.elements import ElementLookup
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.patches import Patches
 from addon.core.scene.visibility import CLEAN, EDGE
-from tests.core.rooms import DARK, Room, around, box_sides, cut, make_room, split
+from tests.core.rooms import DARK, Room, around, box_sides, cut, make_room, quad, split
 
 LAMP = np.array([40.0, 36.0, 30.0], np.float32)
 CLIPPED = 1.0
@@ -103,6 +103,19 @@ def test_sunlight_on_the_floor_is_no_patch():
     assert not len(patches_of(room, seen(dim, np.zeros(len(room.atlas)))))
 
 
+@pytest.mark.parametrize("far_off", [0.3, 1.0])
+def test_what_fades_out_is_lit_and_no_patch(far_off):
+    """A lamp so many metres off a wall lights it; the sensor clips the brightest of that, or a lamp in the wall."""
+    room = make_room(split(quad((0, 0, 0), (4, 0, 0), (0, 4, 0), 0), 80), texel=0.02)
+    from_middle = np.linalg.norm(room.atlas.position[:, :2] - 2, axis=1)
+    light = 0.1 + 3 * (1 + (from_middle / far_off) ** 2) ** -1.5
+    clipped = light > 1.5
+    dark = np.where(clipped, 1.5, 0.3 * light)
+    for shown, patches in ((np.minimum(light, 1.5), 0), (dark, 1)):
+        radiance = np.repeat(shown[:, None], 3, 1).astype(np.float32)
+        assert len(patches_of(room, seen(radiance, clipped.astype(float))).objects) == patches
+
+
 def test_an_object_is_clipped_if_most_frames_show_most_of_it_clipped():
     """Whatever a few pixels of its edge say where poses are off; not if half of its frames tell its radiance."""
     room, (_, radiance) = box(), lit()
@@ -152,8 +165,10 @@ def test_patches_of_about_one_area_in_one_plane_are_the_same_lamp():
 
 
 def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
+    """White paint on a dark floor."""
     room, (_, radiance) = box(), lit()
     floor = (room.atlas.position[:, 2] < 0.01) & (np.abs(room.atlas.position[:, 0] - 2) < 0.4)
+    radiance = np.where(floor[:, None], 3 * radiance, radiance)
     shown = seen(radiance, floor.astype(float))
     patches = patches_of(room, shown)
     mesh = patches.mesh(room.mesh)
