@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 
+from .kinds import Unit
+
+SIGMA_OF_MAD: Unit[float] = 1.4826
+"""A normal distribution's standard deviation over its median absolute deviation."""
+
 
 @dataclass(frozen=True)
 class SignificanceParams:

@@ -18,10 +18,6 @@ class Evidence:
     texels: TexelEvidence
     objects: list[ObjectEvidence]
 
-    def albedo_error(self) -> np.ndarray:
-        """What the picture of that name shows, (n, 3) float32: see docs/result_folder.md."""
-        return self.texels.albedo
-
     def shares(self) -> np.ndarray:
         """What the picture 'evidence' shows, (n, 3) float32."""
         return np.stack([self.texels.shading, self.texels.clipped, self.texels.unseen], -1)

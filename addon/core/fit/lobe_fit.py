@@ -18,7 +18,7 @@ import numpy as np
 
 from ..brdf.dielectric import USUAL_F0
 from ..brdf.model import Constraints
-from ..significance import LEVELS
+from ..significance import LEVELS, SIGMA_OF_MAD
 from .params import LOBE_FIT
 from .problem import DenseProblem, Problem
 
@@ -162,7 +162,7 @@ def huber(size: np.ndarray, scale: float) -> np.ndarray:
 
 def robust_scale(size: np.ndarray) -> float:
     """Standard deviation from the median absolute deviation, never 0."""
-    return max(1.4826 * float(np.median(size)), 1e-4)
+    return max(SIGMA_OF_MAD * float(np.median(size)), 1e-4)
 
 
 def fit_lobe(

@@ -151,10 +151,9 @@ class Openings:
         usual = np.median(self.radiance, 0)
         return replace(self, radiance=np.where(self.bright[:, None], usual, self.radiance).astype(np.float32))
 
-    def behind(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cells behind n places ((n, 3) float32) of a surface, (n,) int, and how far away they are, metres."""
-        cell, distance, _ = exits(self.low, self.size, position, -normal)
-        return cell, distance
+    def behind(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """The cells behind n places ((n, 3) float32) of a surface, (n,) int."""
+        return exits(self.low, self.size, position, -normal)[0]
 
     def panels(self, closing: np.ndarray | None = None, sky: Environment | None = None) -> list[Panel]:
         """The bright cells; those that hang together, and are about as bright, as one.
@@ -173,7 +172,7 @@ class Openings:
         double = np.linalg.norm(turned, axis=1, keepdims=True)
         faces, normal, double = faces[double[:, 0] > 0], turned[double[:, 0] > 0], double[double[:, 0] > 0]
         normal = normal / double
-        cell = self.behind(faces.mean(1), normal)[0]
+        cell = self.behind(faces.mean(1), normal)
         lies = np.arange(CELLS) // GATHER.cells**2
         facing = np.abs(normal[np.arange(len(cell)), lies[cell] // 2])
         shut = np.bincount(cell, 0.5 * double[:, 0] * facing, CELLS)

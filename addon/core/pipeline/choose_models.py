@@ -30,7 +30,7 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
 from ..settings import Settings
-from ..significance import LEVELS
+from ..significance import LEVELS, SIGMA_OF_MAD
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     if problem is not None and choice.fit is not None and "see-through" not in room.settings.without and not guess:
         behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
         lobe = choice.fit if choice.model.has_lobe else None
-        shown = judge(problem, behind, lobe, max(1.4826 * choice.fit.residual, 1e-4))
+        shown = judge(problem, behind, lobe, max(SIGMA_OF_MAD * choice.fit.residual, 1e-4))
         if shown is not None:
             choice = set_apart(choice, shown, is_sure(shown))
     if choice.model.has_albedo and not guess:

@@ -77,7 +77,7 @@ class Recovery(Corrected):
             "shading": lambda: self.irradiance,
             "lit_diffuse": lambda: np.where(lit.seen[:, None], lit.radiance, np.float32(0)),
             "coverage": self._coverage,
-            "albedo_error": self.evidence.albedo_error,
+            "albedo_error": lambda: self.evidence.texels.albedo,
             "evidence": self.evidence.shares,
         }
         give_back()

@@ -306,7 +306,7 @@ def with_found_light(
         own = dark.atlas.object_id == one
         radiance[own] = np.maximum(radiance[own], solved)
     atlas, shut = dark.atlas, found.shut
-    radiance[shut] = found.openings.radiance[found.openings.behind(atlas.position[shut], atlas.normal[shut])[0]]
+    radiance[shut] = found.openings.radiance[found.openings.behind(atlas.position[shut], atlas.normal[shut])]
     # What looked like a lamp for want of light may do so no more.
     seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*found.brighter, *told})
     for lamp in seen:

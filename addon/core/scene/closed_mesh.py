@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..significance import LEVELS
+from ..significance import LEVELS, SIGMA_OF_MAD
 from .closing import plane_axes
 from .model import Capture, Mesh
 from .params import CLOSING, PARTS
@@ -65,7 +65,7 @@ def settled(mesh: Mesh) -> Mesh:
             continue
         lies = _plane_through(centre[beside] - middle, normal, at - middle)
         off = (centre[beside] - middle) @ normal - lies(centre[beside] - middle)
-        spread = 1.4826 * float(np.median(np.abs(off)))
+        spread = SIGMA_OF_MAD * float(np.median(np.abs(off)))
         under = max(spread, CLOSING.under * gap)
         rise = lies(at - middle) - under - (at - middle) @ normal
         vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
@@ -116,7 +116,7 @@ def _plane_through(points: np.ndarray, normal: np.ndarray, wanted: np.ndarray) -
     for _ in range(PARTS.fits):
         slope = np.linalg.lstsq(base * weight[:, None], height * weight, rcond=None)[0]
         off = np.abs(height - base @ slope)
-        weight = 1 / np.sqrt(1 + (off / max(1.4826 * float(np.median(off)), 1e-9)) ** 2)
+        weight = 1 / np.sqrt(1 + (off / max(SIGMA_OF_MAD * float(np.median(off)), 1e-9)) ** 2)
     middle = across.mean(0)
 
     def at(places: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
+from ...significance import SIGMA_OF_MAD
 from .bias_field import without_bias
 from .neighbourhood import References, relative_error, shrink, well_measured
 from .of_class import shrunk_to_class
@@ -200,4 +201,4 @@ def _spread(albedos: list[np.ndarray]) -> float:
     if len(albedos) < 3:
         return ALBEDO.unknown
     level = np.log(np.maximum(np.array(albedos).mean(1), ALBEDO.floor))
-    return max(1.4826 * float(np.median(np.abs(level - np.median(level)))), ALBEDO.least_spread)
+    return max(SIGMA_OF_MAD * float(np.median(np.abs(level - np.median(level)))), ALBEDO.least_spread)

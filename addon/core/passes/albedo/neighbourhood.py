@@ -13,13 +13,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
-from ...groups import by_label
+from ...groups import by_label, cell_of
 from ...kinds import Block
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from .params import ALBEDO, PRIOR
 from .second_colour import Neighbourhood, shrunk_to_second_colour
 
@@ -74,7 +74,7 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -
     def gather(part: slice) -> None:
         around = channels[:, near[part]]
         middle[part] = _median(around).T
-        width[part] = 1.4826 * _median(np.abs(around - middle[part].T[..., None]).mean(0))
+        width[part] = SIGMA_OF_MAD * _median(np.abs(around - middle[part].T[..., None]).mean(0))
 
     for_blocks(gather, len(position), BLOCK, 0)
     return Neighbourhood(middle, np.maximum(width, np.float32(0.02)), near)
@@ -176,11 +176,8 @@ def shrink(
     position = atlas.position[own]
     sure = well_measured(error)
     cell = PRIOR.cell * float(np.sqrt(np.median(atlas.area[own])))
-    place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
-    extent = place.max(0) + 1
-    _, index, count = np.unique(
-        (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2], return_inverse=True, return_counts=True
-    )
+    place = cell_of(position - position.min(0), max(cell, 1e-9))
+    _, index, count = np.unique(place, return_inverse=True, return_counts=True)
     # The prior is asked for at the middle of a cell's elements: at one of them it would be shifted for the others.
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     todo = np.flatnonzero(error > 0)

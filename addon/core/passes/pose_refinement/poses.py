@@ -25,7 +25,7 @@ from ...progress import Progress, Rounds
 from ...scene.model import Camera, Frame, Pixels
 from ...scene.params import SMALL
 from ...scene.visibility import bytes_of_frame
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from ...weighted import weighted_median
 from .params import POSES
 
@@ -205,7 +205,7 @@ def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray, expected
     way = np.zeros(7)
     for _ in range(LEVELS.reweighted):
         left = residual - change @ way
-        spread = max(1.4826 * weighted_median(np.abs(left), telling), POSES.least_spread)
+        spread = max(SIGMA_OF_MAD * weighted_median(np.abs(left), telling), POSES.least_spread)
         weight = POSES.independent / spread**2 / (1 + (left / (LEVELS.outlier * spread)) ** 2)
         weighted = change * weight[:, None]
         way = np.linalg.solve(weighted.T @ change + prior, weighted.T @ residual)

@@ -26,7 +26,7 @@ from ...scene.model import Frame, Mesh, Pixels
 from ...scene.params import VISIBILITY
 from ...scene.radiometry import CODES, Radiometry
 from ...scene.rays import RayScene
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from .observations import CodeObservations, observe_codes
 from .params import CALIBRATION
 from .white_balance import mean_white_balance
@@ -156,7 +156,7 @@ def solve(seen: CodeObservations, frames: int, stated: np.ndarray) -> tuple[np.n
             left = prior[:, c] - design @ x[at]
             w = weight[:, c]
             residual[:, c] = left - ((member @ (w * left)) / np.maximum(member @ w, 1e-12))[point]
-        spread = 1.4826 * float(np.median(np.abs(residual)))
+        spread = SIGMA_OF_MAD * float(np.median(np.abs(residual)))
         # One weight for all channels: what is no diffuse surface is none in all of them.
         sigma = np.maximum(deviation, spread)
         off = np.square(residual / sigma).mean(1, keepdims=True)

@@ -13,7 +13,7 @@ from ...brdf.metal import METAL
 from ...fit.lobe_fit import LobeFit
 from ...fit.params import LOBE_FIT
 from ...fit.problem import Problem
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from .models import Choice, metal_f0, reflectance
 from .one_colour import Coated, OneColour
 from .params import LOOKS
@@ -56,5 +56,5 @@ def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
 
 def _fit(phi: float, psi: np.ndarray, spread: float, diffuse: float) -> LobeFit:
     """The lobe as a fit; its residuals are median sizes, as `LobeFit` has them."""
-    residual, without = spread / 1.4826, diffuse / 1.4826
+    residual, without = spread / SIGMA_OF_MAD, diffuse / SIGMA_OF_MAD
     return LobeFit(phi, psi, 0.0, 0.0, residual, without)

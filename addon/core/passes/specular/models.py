@@ -13,7 +13,7 @@ from ...fit.lobe_fit import LobeFit, element_costs, fit_lobe, held_out_costs, hu
 from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from ...weighted import weighted_median
 from .one_colour import Coated, OneColour
 from .params import CHOICE, FIT
@@ -74,7 +74,7 @@ def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
 
 def _weighed(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
     """An object's observations as sure as they are under its own fit, and the standard deviation of their residual."""
-    scale = max(1.4826 * fit.residual, 1e-4)
+    scale = max(SIGMA_OF_MAD * fit.residual, 1e-4)
     return dense.expecting(fit.phi, fit.psi, scale), scale
 
 

@@ -9,7 +9,7 @@ from scipy import ndimage
 from ...groups import by_label, by_number
 from ...scene.atlas import Atlas
 from ...scene.model import Mesh
-from ...significance import LEVELS
+from ...significance import LEVELS, SIGMA_OF_MAD
 from .params import TEXTURE
 from .planes import Picture, planes_of, texels_of
 from .synthesis import autocovariance, completed, scale_of, smooth_mean, usual_contrast
@@ -83,7 +83,7 @@ def _of_others(log: np.ndarray, source: np.ndarray, known: np.ndarray, error: fl
     dark tile or a knot, is part of the texture.
     """
     off = np.abs(log - np.median(log[source], 0))
-    spread = np.maximum(1.4826 * np.median(off[source], 0), error)
+    spread = np.maximum(SIGMA_OF_MAD * np.median(off[source], 0), error)
     odd = known & (off > LEVELS.sigmas * spread).any(2)
     wide = odd & (ndimage.uniform_filter(odd.astype(np.float32), TEXTURE.mostly, mode="constant") > 0.5)
     label, _ = ndimage.label(ndimage.binary_propagation(wide, mask=odd))

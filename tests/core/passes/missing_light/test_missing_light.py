@@ -245,7 +245,7 @@ def test_a_lamp_behind_faces_that_closed_a_hole_is_told_like_one_in_the_hole():
     assert np.array_equal(found.shut, in_lamp(room))
     place, normal = (getattr(room.atlas, name)[found.shut] for name in ("position", "normal"))
     solved = field.radiance.copy()
-    solved[found.shut] = found.openings.radiance[found.openings.behind(place, normal)[0]]
+    solved[found.shut] = found.openings.radiance[found.openings.behind(place, normal)]
     others = np.flatnonzero(~found.shut)
     E = irradiance_at(field.with_light(solved), others, 0)
     assert off(np.pi * radiance[others] / E, rho[others]) < 0.25
