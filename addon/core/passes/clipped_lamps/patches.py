@@ -7,6 +7,7 @@ Of what is bright and not clipped the radiance is known.
 """
 
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -75,7 +76,8 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     area = np.bincount(of_element[own], atlas.area[own], parts)
     enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
     enough = enough[np.argsort(-area[enough], kind="stable")]
-    kept = np.array([one for one in enough if not _fades(atlas, lit, of_element, one)][: LEVELS.most], int)
+    ends = (one for one in enough if not _fades(atlas, lit, of_element, one))
+    kept = np.array(list(islice(ends, LEVELS.most)), int)
     first = int(mesh.object_id.max()) + 1
     number = np.full(parts, -1)
     number[kept] = first + np.arange(len(kept))
@@ -88,9 +90,9 @@ def _fades(atlas: Atlas, lit: LitDiffuse, patch: np.ndarray, one: int) -> bool:
     own = np.flatnonzero((patch == one) & lit.seen)
     near, far = np.multiply(PATCHES.beside, atlas.texel_edge)
     place, normal = atlas.position[own], atlas.normal[own].mean(0)
-    others = np.flatnonzero((patch < 0) & lit.seen & (atlas.normal @ normal > 0.9 * np.linalg.norm(normal)))
-    within = ((atlas.position[others] > place.min(0) - far) & (atlas.position[others] < place.max(0) + far)).all(1)
-    others = others[within]
+    within = ((atlas.position > place.min(0) - far) & (atlas.position < place.max(0) + far)).all(1)
+    others = np.flatnonzero(within & (patch < 0) & lit.seen)
+    others = others[atlas.normal[others] @ normal > 0.9 * np.linalg.norm(normal)]
     away, _ = cKDTree(place).query(atlas.position[others], distance_upper_bound=far)
     around = others[(away > near) & np.isfinite(away)]
     if len(around) < LEVELS.few:
