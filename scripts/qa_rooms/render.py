@@ -212,30 +212,18 @@ def render(
     (truth / "transforms.json").write_text(json.dumps(lens | {"frames": views}, indent=1))
     scene = bpy.context.scene
     build(room, scene)
-    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    demo_render.set_up_cycles(scene, size, samples)
+    shoot = demo_render.camera_of(scene, size, samples)
     scene.cycles.use_denoising = denoise
     scene.cycles.use_light_tree = True
     # What is cut off after few bounces would look like light that E has too much of: 3 % in a white room after 6.
     scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 24
     scene.cycles.glossy_bounces = 12
-    image = scene.render.image_settings
-    image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
-
-    def shoot(pose, path):
-        camera.matrix_world = Matrix(pose.tolist())
-        scene.render.filepath = str(path)
-        bpy.ops.render.render(write_still=True)
-
     for k, pose in enumerate(poses):
         shoot(pose, folder / frame_path(k))
     # Held-out views: the picture, and what light and colour it is made of.
     layer = scene.view_layers[0]
     layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = layer.use_pass_diffuse_color = True
-    scene.cycles.samples = 2 * samples
+    scene.cycles.samples, image = 2 * samples, scene.render.image_settings
     image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
     for name in ("image", "albedo", "object_id", "diffuse_light", "diffuse_color", f"relight_{RELIT[0]}"):
         (truth / name).mkdir()

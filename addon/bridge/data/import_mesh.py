@@ -15,10 +15,9 @@ from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
 from .added import scene_apart
 from .arrays import layer_of, read, triangles_of, vertices_of
+from .names import split_number
 from .shown import shown
 
-NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
-"""Blender's ending of a name that was taken already."""
 PART, MATERIAL = re.compile(r"^part (\d+)"), re.compile(r"^material (\d+)")
 
 
@@ -103,9 +102,9 @@ def _parts(things: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
             corners = triangles, uv
             if np.linalg.det(one.matrix[:3, :3]) < 0:  # its triangles are wound the other way
                 corners = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
-            name, number = NUMBERED.match(one.name).groups()
+            name, number = split_number(one.name)
             part = _Part(name, vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3], *corners, material)
-            found.append(((name, int(number or 0), order), part))
+            found.append(((name, number, order), part))
     return [part for _, part in sorted(found, key=lambda one: one[0])]
 
 

@@ -1,6 +1,7 @@
 """Renders the demo's room with Cycles into a capture folder, exactly as a scanner's would look."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -69,20 +70,30 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
     with scene_apart("demo") as (scene, _):
         for thing in things:
             scene.collection.objects.link(build(thing))
-        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-        camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
-        scene.collection.objects.link(camera)
-        scene.camera = camera
-        set_up_cycles(scene, size, samples)
-        image = scene.render.image_settings
-        image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
+        shoot = camera_of(scene, size, samples)
         for k, pose in enumerate(poses):
             progress.update(k / len(poses))
-            camera.matrix_world = Matrix(pose.tolist())
-            scene.render.filepath = str(folder / frame_path(k))
-            bpy.ops.render.render(write_still=True, scene=scene.name)
+            shoot(pose, folder / frame_path(k))
             read_header(folder / frame_path(k))  # raises where it is absent or cut off
         progress.update(1.0)
+
+
+def camera_of(scene, size: tuple[int, int], samples: int) -> Callable[[np.ndarray, Path], None]:
+    """The demo's camera in a scene, Cycles and half-float EXR set up: renders from a pose into a file."""
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    set_up_cycles(scene, size, samples)
+    image = scene.render.image_settings
+    image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
+
+    def shoot(pose: np.ndarray, path: Path) -> None:
+        camera.matrix_world = Matrix(pose.tolist())
+        scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+
+    return shoot
 
 
 def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:

@@ -15,6 +15,7 @@ from ..data.added import Made
 from ..data.arrays import faces_of, layer_of
 from ..data.materials import MODEL, opacity
 from ..data.mesh_objects import PARTS_UV
+from ..data.names import split_number
 from ..marks import OBJECT_ID
 from ..refused import refused
 from .material import plain_copy
@@ -285,7 +286,6 @@ def _remove(*paths: Path) -> None:
 
 
 _ASIDE = "Scan Relight keeps "
-_SUFFIX = re.compile(r"\.\d{3,}$")
 
 
 def identifier(name: str) -> str:
@@ -296,7 +296,7 @@ def identifier(name: str) -> str:
 
 def own_name(thing: bpy.types.ID) -> str:
     """An object's or material's name; of a recovered one without the '.001' that Blender adds to the second room's."""
-    return _SUFFIX.sub("", thing.name) if OBJECT_ID in thing or MODEL in thing else thing.name
+    return split_number(thing.name)[0] if OBJECT_ID in thing or MODEL in thing else thing.name
 
 
 def unique(names: Iterable[str]) -> list[str]:

@@ -1,6 +1,5 @@
 """A recovered material in plain Principled terms: numbers, one 8-bit picture over the atlas, one colour of light."""
 
-import re
 from pathlib import Path
 
 import bpy
@@ -24,6 +23,7 @@ from ..data.materials import (
     plain_material,
     principled,
 )
+from ..data.names import split_number
 from ..data.nodes import image_node
 from ..light import lamps
 from ..marks import IMAGE, UV_MAP
@@ -129,7 +129,7 @@ def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
 def _file_name(image: bpy.types.Image, textures: Path) -> str:
     """A name that the folder does not hold yet, whatever the case."""
     taken = {path.stem.casefold() for path in textures.iterdir()}
-    plain = name = bpy.path.clean_name(re.sub(r"\.\d{3,}$", "", image.name))
+    plain = name = bpy.path.clean_name(split_number(image.name)[0])
     number = 1
     while name.casefold() in taken:
         number += 1

@@ -3,7 +3,6 @@
 An object's number alone says nothing: every room counts from 0, and a folder may hold another run than it did.
 """
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import bpy
 
 from ...core.brdf.material import renamed
+from ...core.io.files import json_if_sound
 from ...core.io.folder import MATERIALS, REPORT
 from ..data.materials import MODEL
 from ..marks import OBJECT_ID, RESULT, RUN
@@ -55,7 +55,7 @@ def read(folder: Path) -> Result | None:
     if folder not in _read or _read[folder][0] != stamp:
         if len(_read) > 8:
             _read.clear()
-        report, told = _json(folder / REPORT), _json(folder / MATERIALS)
+        report, told = json_if_sound(folder / REPORT), json_if_sound(folder / MATERIALS)
         listed = [one for one in _of_kind(told, "objects", list) if isinstance(one, dict) and "object_id" in one]
         result = Result(
             folder,
@@ -122,11 +122,3 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return stat.st_mtime_ns, stat.st_size
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return value if isinstance(value, dict) else {}

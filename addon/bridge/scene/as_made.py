@@ -5,7 +5,6 @@ All of it are custom properties: they are saved with the file and need no regist
 
 import hashlib
 import json
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -15,6 +14,7 @@ from mathutils import Matrix
 from ..data.arrays import faces_of, vertices_of
 from ..data.materials import MODEL
 from ..data.mesh_objects import ATLAS_UV, CAPTURE_UV
+from ..data.names import split_number
 from ..light import lamps, outside
 
 NAME = "scan_relight_name"
@@ -26,7 +26,6 @@ SHAPE = "scan_relight_shape"
 WRITTEN = "scan_relight_written"
 """Of a material or world: its nodes' values and links when it was made, as JSON; no digest, as another version of
 Blender may add sockets."""
-_NUMBERED = re.compile(r"\.\d{3,}$")
 _BUILT_IN = {"position", "sharp_face", "sharp_edge", "material_index", ATLAS_UV, CAPTURE_UV}
 
 
@@ -52,7 +51,7 @@ def stamp_tree(owner: bpy.types.Material | bpy.types.World, anew: bool = False) 
 
 def is_renamed(thing: bpy.types.Object) -> bool:
     """Whether the artist gave an object another name."""
-    return _NUMBERED.sub("", thing.name) != _NUMBERED.sub("", thing.get(NAME, ""))
+    return split_number(thing.name)[0] != split_number(thing.get(NAME, ""))[0]
 
 
 def made_at(thing: bpy.types.Object) -> Matrix:
