@@ -1,4 +1,4 @@
-"""What the system or one of Blender's operators refuses, and what is to be said of objects, in one sentence each."""
+"""What the system or one of Blender's operators refuses, and remarks on objects, in one sentence each."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ MAX_TOLD: Shown[int] = 3
 
 
 def reason_of(error: Exception) -> str:
-    """Why, in a line: the system's word, or an operator's without what Blender puts around it."""
+    """The reason in one line: the system's message, or an operator's without what Blender puts around it."""
     return " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
 
 
@@ -41,16 +41,16 @@ def whole_folder(folder: Path, what: str) -> Iterator[Path]:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def sentences(*told: tuple[list[str], str]) -> tuple[str, ...]:
-    """One on all objects of which the same is to be said, by their names; none where there are none."""
-    return tuple(f"{_few(names)}: {what}." for names, what in told if names)
+def sentences(*remarks: tuple[list[str], str]) -> tuple[str, ...]:
+    """One sentence for each remark, naming all objects that it is about; remarks without objects are left out."""
+    return tuple(f"{_list_names(names)}: {what}." for names, what in remarks if names)
 
 
-def _few(names: list[str]) -> str:
-    """The objects of these names, for a sentence: the first ones, and how many more."""
-    shown = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
+def _list_names(names: list[str]) -> str:
+    """Names of objects for a sentence: the first ones, and how many more."""
+    listed = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
     return (
-        f"Objects {shown} and {len(names) - MAX_TOLD} more"
+        f"Objects {listed} and {len(names) - MAX_TOLD} more"
         if len(names) > MAX_TOLD
-        else f"Object{'s' if len(names) > 1 else ''} {shown}"
+        else f"Object{'s' if len(names) > 1 else ''} {listed}"
     )

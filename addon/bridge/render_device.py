@@ -1,4 +1,4 @@
-"""The processor or graphics card that Cycles renders on: told in this Blender, taken up in another one.
+"""The processor or graphics card that Cycles renders on: named in this Blender, used in another.
 
 A process of its own starts with factory settings, so what the artist's preferences say has to be handed over in words.
 """
@@ -12,7 +12,7 @@ TYPES = ("OPTIX", "CUDA", "HIP", "METAL", "ONEAPI")
 """Cycles' kinds of graphics card, the quicker one first where a card is of two kinds."""
 
 
-def told_device(scene: bpy.types.Scene) -> str:
+def current_device(scene: bpy.types.Scene) -> str:
     """The device that this scene renders on here, for `use_device`: 'CPU', or a kind and the cards' ids."""
     preferences = preferences_of_cycles()
     if preferences is None or scene.cycles.device != "GPU" or preferences.compute_device_type == "NONE":
@@ -22,14 +22,14 @@ def told_device(scene: bpy.types.Scene) -> str:
     return f"{kind}={'|'.join(used)}" if used else CPU
 
 
-def use_device(scene: bpy.types.Scene, told: str) -> str:
+def use_device(scene: bpy.types.Scene, device: str) -> str:
     """Have a scene rendered on a device, on the processor where it is not to be had.
 
     Parameters
     ----------
-    told : str
+    device : str
         'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or what
-        `told_device` gave. Whatever the case, but for ids.
+        `current_device` gave. Whatever the case, but for ids.
 
     Returns
     -------
@@ -41,15 +41,15 @@ def use_device(scene: bpy.types.Scene, told: str) -> str:
     BadInputError
         There is no such kind of device.
     """
-    kind, _, ids = told.partition("=")
-    kind, wanted = kind.strip().upper(), {one for one in ids.split("|") if one}
+    kind, _, ids = device.partition("=")
+    kind, wanted = kind.strip().upper(), {card for card in ids.split("|") if card}
     if kind not in (CPU, GPU, *TYPES):
-        raise BadInputError(f"There is no device '{told}'; take cpu, gpu or one of {', '.join(TYPES).lower()}.")
+        raise BadInputError(f"There is no device '{device}'; take cpu, gpu or one of {', '.join(TYPES).lower()}.")
     if kind == CPU:
         scene.cycles.device = "CPU"
         return ""
-    for one in TYPES if kind == GPU else (kind,):
-        if _enable(one, wanted):
+    for device_type in TYPES if kind == GPU else (kind,):
+        if _enable(device_type, wanted):
             scene.cycles.device = "GPU"
             return ""
     scene.cycles.device = "CPU"

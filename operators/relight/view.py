@@ -13,7 +13,7 @@ from ...addon.bridge.light.room import cast
 from ...addon.bridge.marks import OBJECT_ID
 from ...addon.bridge.relight import before_after, match_frame, pictures
 from ...addon.bridge.relight import virtual_object as virtual
-from ...addon.bridge.render_device import told_device
+from ...addon.bridge.render_device import current_device
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator, areas
 from ..base.operator import TURNING, file_property, mouse_ray, needs, no_run
@@ -221,7 +221,7 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
             engine=self.engine.lower(),
             samples=self.samples,
             size=self.percentage,
-            device=told_device(context.scene),
+            device=current_device(context.scene),
             scene=context.scene.name,
             **FOLLOWED,
         )

@@ -26,26 +26,26 @@ from .material import entry
 from .unseen import room_of
 
 ROUGHNESS: Shown[float] = 0.3
-"""What is shown until a refit, where nothing better is known."""
+"""Shown until a refit, where nothing better is known."""
 
 _written: dict[Path, set[int | str]] = {}
 """Objects, by result folder, whose entries in its overrides.json come from this session's scenes: undo reaches them."""
 
 
-def correctable(thing: bpy.types.Object | None) -> bool:
+def correctable(obj: bpy.types.Object | None) -> bool:
     """Whether an object wears a recovered material that can be changed."""
     return (
-        thing is not None
-        and thing.type == "MESH"
-        and OBJECT_ID in thing
-        and not thing.library
-        and material.worn_material(thing) is not None
+        obj is not None
+        and obj.type == "MESH"
+        and OBJECT_ID in obj
+        and not obj.library
+        and material.worn_material(obj) is not None
     )
 
 
-def result_folder(thing: bpy.types.Object) -> Path | None:
+def result_folder(obj: bpy.types.Object) -> Path | None:
     """The result folder that an object came from; None where it is gone."""
-    folder = Path(thing[RESULT]) if thing.get(RESULT) else None
+    folder = Path(obj[RESULT]) if obj.get(RESULT) else None
     result = file.read(folder) if folder else None
     return folder if result is not None and result.objects else None
 
@@ -56,93 +56,91 @@ def made_by(folder: Path) -> dict[int, dict[str, Any]]:
     return dict(result.objects) if result else {}
 
 
-def given(thing: bpy.types.Object) -> dict[str, Any]:
+def given(obj: bpy.types.Object) -> dict[str, Any]:
     """What is given of an object: by the artist here, else by the overrides that its run was made with."""
-    if GIVEN not in thing:
-        return dict(entry(thing).get("given") or {})
+    if GIVEN not in obj:
+        return dict(entry(obj).get("given") or {})
     try:
-        value = json.loads(thing[GIVEN])
+        value = json.loads(obj[GIVEN])
     except (TypeError, ValueError):
         return {}
     return value if isinstance(value, dict) else {}
 
 
-def give(thing: bpy.types.Object, **values) -> None:
-    """Say something of an object's material and show it.
+def give(obj: bpy.types.Object, **values) -> None:
+    """Override values of an object's material and show the result.
 
     Parameters
     ----------
-    thing : bpy.types.Object
+    obj : bpy.types.Object
         `correctable`.
     **values
-        As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None takes one back. What contradicts
-        them and was given before goes (`core.results.overrides.merge`).
+        As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None removes one. Earlier values that
+        contradict them go (`core.results.overrides.merge`).
 
     Raises
     ------
     BadInputError
-        A value can't be, or objects would be the same as each other in a circle.
+        A value is impossible, or `same_as` would form a circle.
     """
-    number = thing[OBJECT_ID]
-    room = {one[OBJECT_ID]: one for one in room_of(thing)}
+    number = obj[OBJECT_ID]
+    room = {member[OBJECT_ID]: member for member in room_of(obj)}
     newer = parse(
-        {"objects": {str(number): {key: _plain(value) for key, value in values.items()}}},
-        f"Object '{thing.name}'",
-        room,
+        {"objects": {str(number): {key: _plain(value) for key, value in values.items()}}}, f"Object '{obj.name}'", room
     )
-    older = {i: Given(**_tuples(given(one))) for i, one in room.items() if i == number or GIVEN in one}
-    said = merge(Overrides(older), newer).of(number).as_dict()
-    material.note(thing)
-    thing[GIVEN] = json.dumps(said)
-    show(thing)
-    for other in room_of(thing):
-        if other != thing and GIVEN in other and given(other).get("same_as") == number:
+    older = {i: Given(**_tuples(given(member))) for i, member in room.items() if i == number or GIVEN in member}
+    override = merge(Overrides(older), newer).of(number).as_dict()
+    material.note(obj)
+    obj[GIVEN] = json.dumps(override)
+    show(obj)
+    for other in room_of(obj):
+        if other != obj and GIVEN in other and given(other).get("same_as") == number:
             show(other)
 
 
-def take_back(thing: bpy.types.Object, *keys: str) -> None:
+def take_back(obj: bpy.types.Object, *keys: str) -> None:
     """Go back to what was found, for `keys` or in everything."""
-    give(thing, **dict.fromkeys(keys or tuple(given(thing)), None))
+    give(obj, **dict.fromkeys(keys or tuple(given(obj)), None))
 
 
 def _plain(value):
-    """Numbers as JSON has them, within 0...1; all else as it is."""
+    """Numbers for JSON, clamped to 0...1; all else unchanged."""
     if isinstance(value, (str, int)) or value is None:
         return value
-    return [_plain(one) for one in value] if hasattr(value, "__len__") else round(min(max(float(value), 0.0), 1.0), 6)
+    return [_plain(item) for item in value] if hasattr(value, "__len__") else round(min(max(float(value), 0.0), 1.0), 6)
 
 
-def _tuples(said: dict[str, Any]) -> dict[str, Any]:
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in said.items()}
+def _tuples(override: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in override.items()}
 
 
-def by_id(thing: bpy.types.Object, number: int) -> bpy.types.Object | None:
+def by_id(obj: bpy.types.Object, number: int) -> bpy.types.Object | None:
     """Another object of the same room."""
-    return next((one for one in room_of(thing) if one[OBJECT_ID] == number and correctable(one)), None)
+    return next((other for other in room_of(obj) if other[OBJECT_ID] == number and correctable(other)), None)
 
 
-def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[str, Any]:
+def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:
     """What was found of an object (`material.found`) with what is given laid over it."""
-    said = given(thing)
-    other = by_id(thing, said["same_as"]) if said.get("same_as") is not None else None
-    theirs = {}
-    if other is not None and other.name not in seen:
-        theirs = effective(other, seen | {thing.name})
-        theirs = {key: theirs[key] for key in LOBE}
-    values = _under(thing, said, (said | theirs).get("model"))
-    before = values["model"]
-    values |= theirs
-    values |= {key: said[key] for key in (*LOBE, "base_color") if key in said}
+    override = given(obj)
+    source = by_id(obj, override["same_as"]) if override.get("same_as") is not None else None
+    copied = {}
+    if source is not None and source.name not in visited:
+        copied = effective(source, visited | {obj.name})
+        copied = {key: copied[key] for key in LOBE}
+    values = _base_values(obj, override, (override | copied).get("model"))
+    previous_model = values["model"]
+    values |= copied
+    values |= {key: override[key] for key in (*LOBE, "base_color") if key in override}
     model = shown(values["model"])
-    if "model" not in said and {"f0", "roughness"} & said.keys() and model.has_albedo and not model.has_lobe:
+    if "model" not in override and {"f0", "roughness"} & override.keys() and model.has_albedo and not model.has_lobe:
         model = DIELECTRIC
         values["model"] = model.name
-    if model.lobe_alone and "base_color" in said and "f0" not in said:
-        values["f0"] = said["base_color"]
+    if model.lobe_alone and "base_color" in override and "f0" not in override:
+        values["f0"] = override["base_color"]
     if model.has_lobe:
         if values["roughness"] is None:
             values["roughness"] = ROUGHNESS
-        new_model = values["model"] != before and other is None and not {"f0", "base_color"} & said.keys()
+        new_model = values["model"] != previous_model and source is None and not {"f0", "base_color"} & override.keys()
         if values["f0"] is None or new_model:
             values["f0"] = model.plausible_f0(values["base_color"])
         f0 = model.as_f0(values["f0"])
@@ -150,55 +148,55 @@ def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[st
     return values
 
 
-def _under(thing: bpy.types.Object, said: dict, model: str | None) -> dict[str, Any]:
-    """What to lay given values over: what the run fitted to that model, else what was found before it was given one."""
-    was, made = material.found(thing), material.worn(thing)
-    if made["model"] != (model or was["model"]):
-        return was
-    back = (entry(thing).get("given") or {}).keys() - said.keys()  # given to the run, and not any more
-    return made | {key: was[key] for key in made if key in back or ("same_as" in back and key in LOBE)}
+def _base_values(obj: bpy.types.Object, override: dict, model: str | None) -> dict[str, Any]:
+    """The values that an override replaces: fitted by the run to that model, else found before one was given."""
+    original, worn = material.found(obj), material.worn(obj)
+    if worn["model"] != (model or original["model"]):
+        return original
+    withdrawn = (entry(obj).get("given") or {}).keys() - override.keys()  # given to the run, and not any more
+    return worn | {key: original[key] for key in worn if key in withdrawn or ("same_as" in withdrawn and key in LOBE)}
 
 
-def show(thing: bpy.types.Object) -> None:
+def show(obj: bpy.types.Object) -> None:
     """Bring an object's material in line with what is given."""
-    if correctable(thing):
-        with our_own(material.worn_material(thing)):
-            material.show(thing, effective(thing))
-        if not given(thing) and material.found(thing) == material.worn(thing):
-            thing.pop(FOUND, None)
+    if correctable(obj):
+        with our_own(material.worn_material(obj)):
+            material.show(obj, effective(obj))
+        if not given(obj) and material.found(obj) == material.worn(obj):
+            obj.pop(FOUND, None)
 
 
-def reapply(thing: bpy.types.Object) -> list[str]:
-    """Bring back what the artist did to an object whose mesh or material a run has just made anew.
+def reapply(obj: bpy.types.Object) -> list[str]:
+    """Restore what the artist did to an object whose mesh or material a run has just made anew.
 
-    Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
-    Returns sentences on what no longer fits.
+    Its corrected values, its painted image, its smooth shading. Called at the end of each object's update. Returns
+    warnings on what no longer fits.
     """
-    if thing.type == "MESH" and SMOOTH in thing and not thing.data.library:
-        _shade(thing.data, thing[SMOOTH])
-    if not correctable(thing) or is_corrected(material.worn_material(thing)):
+    if obj.type == "MESH" and SMOOTH in obj and not obj.data.library:
+        _shade(obj.data, obj[SMOOTH])
+    if not correctable(obj) or is_corrected(material.worn_material(obj)):
         return []
-    material.renew(thing, given(thing))
-    said = unseen.reapply(thing)
-    show(thing)
-    return said
+    material.renew(obj, given(obj))
+    messages = unseen.reapply(obj)
+    show(obj)
+    return messages
 
 
-def smooth(things: Iterable[bpy.types.Object], angle: float) -> int:
+def smooth(objects: Iterable[bpy.types.Object], angle: float) -> int:
     """Shade objects smooth but for edges sharper than `angle` radians; 0 makes them flat again.
 
     The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
     found. Returns how many meshes were changed.
     """
     changed = set()
-    for thing in things:
+    for obj in objects:
         if angle > 0:
-            thing[SMOOTH] = float(angle)
-        elif SMOOTH in thing:
-            del thing[SMOOTH]
-        if thing.data not in changed:
-            _shade(thing.data, angle)
-            changed.add(thing.data)
+            obj[SMOOTH] = float(angle)
+        elif SMOOTH in obj:
+            del obj[SMOOTH]
+        if obj.data not in changed:
+            _shade(obj.data, angle)
+            changed.add(obj.data)
     return len(changed)
 
 
@@ -213,27 +211,27 @@ def _shade(data: bpy.types.Mesh, angle: float) -> None:
     data.update()
 
 
-def say_white(thing: bpy.types.Object, albedo) -> None:
-    """Say what albedo an object has (number or three, 0...1), in place of any other of its room."""
+def say_white(obj: bpy.types.Object, albedo) -> None:
+    """Give an object's albedo (one number or three, 0...1), in place of any other given in its room."""
     value = _plain(albedo if hasattr(albedo, "__len__") else [float(albedo)] * 3)
-    take_white_back(thing)
-    thing[WHITE] = value
+    take_white_back(obj)
+    obj[WHITE] = value
 
 
-def white_of(thing: bpy.types.Object) -> tuple[bpy.types.Object, list[float]] | None:
+def white_of(obj: bpy.types.Object) -> tuple[bpy.types.Object, list[float]] | None:
     """The object of a room whose albedo is given, and that albedo; None where none is."""
-    return next(((one, list(one[WHITE])) for one in room_of(thing) if WHITE in one), None)
+    return next(((member, list(member[WHITE])) for member in room_of(obj) if WHITE in member), None)
 
 
-def take_white_back(thing: bpy.types.Object) -> None:
-    """Let the frames alone say the room's scale again."""
-    for other in room_of(thing):
+def take_white_back(obj: bpy.types.Object) -> None:
+    """Have the room's scale follow from the frames alone again."""
+    for other in room_of(obj):
         other.pop(WHITE, None)
 
 
-def folder_for(things: Iterable[bpy.types.Object]) -> Path:
-    """The one result folder of `things`; raises `BadInputError` where there are several, or none any more."""
-    folders = {result_folder(thing) for thing in things}
+def folder_for(objects: Iterable[bpy.types.Object]) -> Path:
+    """The one result folder of `objects`; raises `BadInputError` where there are several, or none any more."""
+    folders = {result_folder(obj) for obj in objects}
     if len(folders) != 1:
         raise BadInputError("The selected objects come from several results; select those of one room.")
     folder = folders.pop()
@@ -246,24 +244,29 @@ def folder_for(things: Iterable[bpy.types.Object]) -> Path:
 
 def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
     """`keep` before a capture is run into `folder`, which may be another one than the scene's room came from."""
-    room = {thing for part in bpy.data.collections if part.get(CAPTURE) == str(capture) for thing in part.all_objects}
-    things = [
-        thing
-        for thing in look.recovered(scene)
-        if result_folder(thing) == folder or thing.get(CAPTURE) == str(capture) or thing in room
+    room = {
+        obj
+        for collection in bpy.data.collections
+        if collection.get(CAPTURE) == str(capture)
+        for obj in collection.all_objects
+    }
+    objects = [
+        obj
+        for obj in look.recovered(scene)
+        if result_folder(obj) == folder or obj.get(CAPTURE) == str(capture) or obj in room
     ]
-    if any(GIVEN in thing or WHITE in thing for thing in things) or _written.get(folder):
+    if any(GIVEN in obj or WHITE in obj for obj in objects) or _written.get(folder):
         if not folder.exists():
             folder.mkdir(parents=True)
             write_capture(folder, capture)  # from the first file on it is that capture's
-        keep(scene, folder, things)
+        keep(scene, folder, objects)
 
 
-def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object] | None = None) -> set[int]:
+def keep(scene: bpy.types.Scene, folder: Path, objects: Iterable[bpy.types.Object] | None = None) -> set[int]:
     """Bring a result's `overrides.json` in line with what is given in a scene.
 
     Entries of objects of which the scene says nothing are left alone, unless it was this session that wrote them: then
-    the artist has taken them back by undo. `things` are the room's objects, by default those of that result.
+    the artist has taken them back by undo. `objects` are the room's objects, by default those of that result.
 
     Returns
     -------
@@ -277,24 +280,24 @@ def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object
     StorageError
         It can't be written.
     """
-    if things is None:
-        things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]
-    said = {thing[OBJECT_ID]: Given(**_tuples(given(thing))) for thing in things if GIVEN in thing}
+    if objects is None:
+        objects = [obj for obj in look.recovered(scene) if result_folder(obj) == folder]
+    scene_entries = {obj[OBJECT_ID]: Given(**_tuples(given(obj))) for obj in objects if GIVEN in obj}
     result = made_by(folder)
-    before = kept_overrides(folder, {*result, *(thing[OBJECT_ID] for thing in things)})
-    ours = _written.setdefault(folder, set())
-    objects = {i: one for i, one in before.objects.items() if i not in ours} | said
-    white = before.white if "white" not in ours else None
-    stated = next((thing for thing in things if WHITE in thing), None)
-    if stated is not None:
-        white = White(stated[OBJECT_ID], tuple(stated[WHITE]))
-    now = Overrides({i: one for i, one in objects.items() if one.any}, white)
-    if now.as_dict() != before.as_dict():
-        write_bytes(folder / OVERRIDES, json.dumps(now.as_dict(), indent=1).encode())
-    ours |= said.keys() | ({"white"} if stated is not None else set())
-    return {i for i, one in result.items() if now.of(i).as_dict() != (one.get("given") or {})}
+    stored = kept_overrides(folder, {*result, *(obj[OBJECT_ID] for obj in objects)})
+    written = _written.setdefault(folder, set())
+    entries = {i: override for i, override in stored.objects.items() if i not in written} | scene_entries
+    white = stored.white if "white" not in written else None
+    white_object = next((obj for obj in objects if WHITE in obj), None)
+    if white_object is not None:
+        white = White(white_object[OBJECT_ID], tuple(white_object[WHITE]))
+    updated = Overrides({i: override for i, override in entries.items() if override.any}, white)
+    if updated.as_dict() != stored.as_dict():
+        write_bytes(folder / OVERRIDES, json.dumps(updated.as_dict(), indent=1).encode())
+    written |= scene_entries.keys() | ({"white"} if white_object is not None else set())
+    return {i for i, override in result.items() if updated.of(i).as_dict() != (override.get("given") or {})}
 
 
 def forget() -> None:
-    """Know nothing of what was written in this session."""
+    """Forget what was written in this session."""
     _written.clear()

@@ -36,87 +36,87 @@ TINT = "Scan Relight tint"
 _NUMBERS = (METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_STRENGTH)
 
 
-def worn_material(thing: bpy.types.Object) -> bpy.types.Material | None:
+def worn_material(obj: bpy.types.Object) -> bpy.types.Material | None:
     """The recovered material that an object wears; None where it wears none that can be changed."""
     return next(
         (
             slot.material
-            for slot in thing.material_slots
+            for slot in obj.material_slots
             if slot.material and MODEL in slot.material and not slot.material.library and principled(slot.material)
         ),
         None,
     )
 
 
-def entry(thing: bpy.types.Object) -> dict[str, Any]:
+def entry(obj: bpy.types.Object) -> dict[str, Any]:
     """What an object's own run says of it; {} where that is gone or another run took its place."""
-    return file.rows([thing]).get(thing, {})
+    return file.rows([obj]).get(obj, {})
 
 
-def found(thing: bpy.types.Object) -> dict[str, Any]:
+def found(obj: bpy.types.Object) -> dict[str, Any]:
     """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
-    return worn(thing) | json.loads(thing.get(FOUND, "{}"))
+    return worn(obj) | json.loads(obj.get(FOUND, "{}"))
 
 
-def worn(thing: bpy.types.Object) -> dict[str, Any]:
-    """The same as the run has made its material, under whatever was given to that run."""
-    material = worn_material(thing)
-    return json.loads(material[WORN])["values"] if WORN in material else _shown(material, entry(thing))
+def worn(obj: bpy.types.Object) -> dict[str, Any]:
+    """The same values as the run wrote them into its material, with what was given to that run."""
+    material = worn_material(obj)
+    return json.loads(material[WORN])["values"] if WORN in material else _shown_values(material, entry(obj))
 
 
-def note(thing: bpy.types.Object) -> None:
+def note(obj: bpy.types.Object) -> None:
     """Note what was found, before the first thing is given."""
-    if FOUND not in thing and not entry(thing).get("given"):
-        thing[FOUND] = json.dumps(worn(thing))
+    if FOUND not in obj and not entry(obj).get("given"):
+        obj[FOUND] = json.dumps(worn(obj))
 
 
-def renew(thing: bpy.types.Object, given: dict[str, Any]) -> None:
-    """A run has made the material anew: of what was found before stays what is given in its stead."""
-    worn_material(thing).pop(WORN, None)
+def renew(obj: bpy.types.Object, given: dict[str, Any]) -> None:
+    """A run has made the material anew: keep of the values found before only those that are overridden."""
+    worn_material(obj).pop(WORN, None)
     keys = given.keys() | (set(LOBE) if {"model", "same_as"} & given.keys() else set())
-    kept = {key: value for key, value in json.loads(thing.get(FOUND, "{}")).items() if key in keys}
-    if kept:
-        thing[FOUND] = json.dumps(kept)
+    remaining = {key: value for key, value in json.loads(obj.get(FOUND, "{}")).items() if key in keys}
+    if remaining:
+        obj[FOUND] = json.dumps(remaining)
     else:
-        thing.pop(FOUND, None)
+        obj.pop(FOUND, None)
 
 
-def show(thing: bpy.types.Object, wanted: dict[str, Any]) -> None:
+def show(obj: bpy.types.Object, values: dict[str, Any]) -> None:
     """Bring a material in line.
 
     Parameters
     ----------
-    wanted : dict
+    values : dict
         `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
     """
-    material, made = worn_material(thing), worn(thing)
+    material, original = worn_material(obj), worn(obj)
     if WORN not in material:
-        if wanted == made:
+        if values == original:
             return
-        material[WORN] = json.dumps({"values": made, "sockets": _sockets(material)})
+        material[WORN] = json.dumps({"values": original, "sockets": _sockets(material)})
     _restore(material, json.loads(material[WORN])["sockets"])
-    if wanted == made:
+    if values == original:
         del material[WORN]
         return
-    inputs, model = principled(material).inputs, shown(wanted["model"])
-    if wanted["model"] != made["model"]:
+    inputs, model = principled(material).inputs, shown(values["model"])
+    if values["model"] != original["model"]:
         inputs[METALLIC].default_value = float(model.lobe_alone)
         inputs[SPECULAR_LEVEL].default_value = 0.5 if model.has_lobe else 0.0
         inputs[EMISSION_STRENGTH].default_value = 0.0
-    if wanted["roughness"] is not None and wanted["roughness"] != made["roughness"]:
-        inputs[ROUGHNESS].default_value = wanted["roughness"]
-    if model.layered and wanted["f0"] != made["f0"]:
-        inputs[IOR].default_value = ior_of(wanted["f0"])
-    if model.lobe_alone and wanted["f0"] != made["f0"]:
-        _plain_colour(material, wanted["f0"])
-    elif not model.lobe_alone and wanted["base_color"] and wanted["base_color"] != made["base_color"]:
-        _tint(material, wanted["base_color"], made["base_color"])
+    if values["roughness"] is not None and values["roughness"] != original["roughness"]:
+        inputs[ROUGHNESS].default_value = values["roughness"]
+    if model.layered and values["f0"] != original["f0"]:
+        inputs[IOR].default_value = ior_of(values["f0"])
+    if model.lobe_alone and values["f0"] != original["f0"]:
+        _plain_colour(material, values["f0"])
+    elif not model.lobe_alone and values["base_color"] and values["base_color"] != original["base_color"]:
+        _tint(material, values["base_color"], original["base_color"])
 
 
-def _shown(material, entry: dict) -> dict[str, Any]:
-    """What a material that nobody has changed shows, in the terms of an override."""
+def _shown_values(material, entry: dict) -> dict[str, Any]:
+    """The values of an unchanged material, in the terms of an override."""
     inputs, model = principled(material).inputs, brdf_of(material) or LAMBERTIAN
-    colour = [round(one, 6) for one in inputs[BASE_COLOR].default_value[:3]]
+    colour = [round(c, 6) for c in inputs[BASE_COLOR].default_value[:3]]
     f0 = colour if model.lobe_alone else (f0_of(material) or 0.0) if model.has_lobe else None
     albedo = (entry.get("evidence") or {}).get("albedo")
     return {
@@ -147,13 +147,13 @@ def _restore(material, sockets: dict) -> None:
         tree.nodes.remove(tint)
     node = tree.nodes.get(sockets["from"][0]) if sockets["from"] else None
     if node is not None and not inputs[BASE_COLOR].links:
-        output = next((one for one in node.outputs if one.identifier == sockets["from"][1]), None)
+        output = next((socket for socket in node.outputs if socket.identifier == sockets["from"][1]), None)
         if output is not None:
             tree.links.new(output, inputs[BASE_COLOR])
 
 
 def _plain_colour(material, colour) -> None:
-    """One colour, no texture: its node stays for the way back."""
+    """One colour, no texture: the texture's node stays, so that it can be linked again."""
     socket = principled(material).inputs[BASE_COLOR]
     for link in list(socket.links):
         material.node_tree.links.remove(link)
@@ -166,7 +166,7 @@ def _tint(material, colour, mean) -> None:
     if not socket.links or not mean or min(mean) < 1e-3:
         _plain_colour(material, colour)
         return
-    factors = [wished / is_ for wished, is_ in zip(colour, mean, strict=True)]
+    factors = [target / current for target, current in zip(colour, mean, strict=True)]
     if max(abs(factor - 1) for factor in factors) < 0.005:
         return
     texture = socket.links[0].from_socket

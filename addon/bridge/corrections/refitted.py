@@ -1,4 +1,4 @@
-"""Some objects of a room fitted again under what the artist gives, and brought into the scene where they are."""
+"""Objects of a room fitted again under the artist's overrides, and updated in the scene."""
 
 import shutil
 from collections.abc import Generator, Iterable
@@ -21,16 +21,16 @@ from ..scene.write import BASE_COLOR
 from . import corrections, unseen
 from .material import worn_material
 
-_WORN = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "given")
-"""Of an entry of materials.json, what its object's material is made of."""
+_MATERIAL_KEYS = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "given")
+"""Keys of an entry of materials.json that its object's material is made of."""
 
 
-def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[Path, list[str], dict[int, dict]]:
-    """What has to be run: writes down what is given and finds all that it bears on.
+def words(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[Path, list[str], dict[int, dict]]:
+    """The command to run: writes the overrides and finds all objects that they affect.
 
     Parameters
     ----------
-    things : iterable of bpy.types.Object
+    objects : iterable of bpy.types.Object
         At least these are fitted again; they are of one room.
 
     Returns
@@ -49,11 +49,11 @@ def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[P
     StorageError
         Its `overrides.json` can't be written.
     """
-    things = list(things)
-    folder = corrections.folder_for(things)
-    numbers = corrections.keep(scene, folder) | {thing[OBJECT_ID] for thing in things}
-    objects = [word for number in sorted(numbers) for word in ("--object", str(number))]
-    return folder, ["refit", str(folder), *objects], corrections.made_by(folder)
+    objects = list(objects)
+    folder = corrections.folder_for(objects)
+    numbers = corrections.keep(scene, folder) | {obj[OBJECT_ID] for obj in objects}
+    options = [word for number in sorted(numbers) for word in ("--object", str(number))]
+    return folder, ["refit", str(folder), *options], corrections.made_by(folder)
 
 
 def fitted(folder: Path) -> file.Result:
@@ -78,25 +78,23 @@ def bringing(
     after : result_file.Result
         What `words` and `fitted` gave.
     """
-    things = [
-        thing
-        for thing in scene.objects
-        if corrections.correctable(thing) and corrections.result_folder(thing) == folder
+    objects = [
+        obj for obj in scene.objects if corrections.correctable(obj) and corrections.result_folder(obj) == folder
     ]
     image = _renew_images(folder)
     run, warnings, by_hand = after.run, [], []
-    for done, thing in enumerate(things):
-        yield done / max(len(things), 1)
-        number = thing[OBJECT_ID]
-        now = after.objects.get(number)
-        mark(thing, folder, run)
-        if now is not None and any(now.get(key) != before.get(number, {}).get(key) for key in _WORN):
-            if is_corrected(worn_material(thing)):
-                by_hand.append(thing.name)
+    for done, obj in enumerate(objects):
+        yield done / max(len(objects), 1)
+        number = obj[OBJECT_ID]
+        entry = after.objects.get(number)
+        mark(obj, folder, run)
+        if entry is not None and any(entry.get(key) != before.get(number, {}).get(key) for key in _MATERIAL_KEYS):
+            if is_corrected(worn_material(obj)):
+                by_hand.append(obj.name)
                 continue
-            shown = (getattr(node, "image", None) for node in worn_material(thing).node_tree.nodes)
-            _dress(thing, now, next((one for one in shown if one and UV_MAP in one), image))
-            warnings += corrections.reapply(thing)
+            node_images = (getattr(node, "image", None) for node in worn_material(obj).node_tree.nodes)
+            _dress(obj, entry, next((texture for texture in node_images if texture and UV_MAP in texture), image))
+            warnings += corrections.reapply(obj)
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             mark(collection, folder, run)
@@ -104,47 +102,47 @@ def bringing(
     return (*warnings, *sentences((by_hand, "the material was edited by hand and stays")))
 
 
-def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:
+def _dress(obj: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:
     """Make an object's material anew in place; a lamp stays as bright as it was set."""
-    worn = worn_material(thing)
-    description, node = material(entry), unseen.texture_node(thing)
+    worn = worn_material(obj)
+    description, node = material(entry), unseen.texture_node(obj)
     if node is not None:
         image = unseen.source_of(node.image)
     state = lamps.snapshot(worn) if lamps.is_lamp(worn) else None
     if state is not None:
         lamps.restore(worn)
-    dress(worn, description, image, one_sided=description.model.gives_light and is_open(thing.data))
+    dress(worn, description, image, one_sided=description.model.gives_light and is_open(obj.data))
     stamp_tree(worn, anew=True)
     if state is not None and description.model.gives_light:
         lamps.put_back(worn, state)
 
 
 def _renew_images(folder: Path) -> bpy.types.Image | None:
-    """Read the result's images again, whether they are referred to, packed or copies; the one of the room's colours."""
-    found = None
-    for one in bpy.data.images:
-        if one.library or one.source not in ("FILE", "TILED"):
+    """Reload the result's images, whether linked, packed or copied; returns the room's Base Color."""
+    base_color = None
+    for image in bpy.data.images:
+        if image.library or image.source not in ("FILE", "TILED"):
             continue
-        shown = result_images.path_of(one)
-        source = Path(one.get(IMAGE) or shown)
+        path = result_images.path_of(image)
+        source = Path(image.get(IMAGE) or path)
         if not source.is_relative_to(folder) or not result_images.is_there(source):
             continue
-        if one.packed_file:
-            one.unpack(method="REMOVE")
-            one.filepath = str(source)
-            one.reload()
-            one.pack()
+        if image.packed_file:
+            image.unpack(method="REMOVE")
+            image.filepath = str(source)
+            image.reload()
+            image.pack()
         else:
-            for part in tiles_of(source) or [source]:
-                if shown.is_relative_to(folder / result_images.KEPT):
-                    result_images.link(part, shown.parent / part.name)
-                elif shown != source:
-                    target = shown.parent / part.name if part != source else shown
+            for tile in tiles_of(source) or [source]:
+                if path.is_relative_to(folder / result_images.KEPT):
+                    result_images.link(tile, path.parent / tile.name)
+                elif path != source:
+                    target = path.parent / tile.name if tile != source else path
                     with refused(f"'{target}' can't be written", "free some space and refit again"):
-                        shutil.copyfile(part, target)
-            one.reload()
-        one[IMAGE] = str(source)
-        found = one if source.name == BASE_COLOR else found
-    if found is None and (folder / BASE_COLOR).is_file():
-        found = result_images.image(folder, BASE_COLOR)
-    return found
+                        shutil.copyfile(tile, target)
+            image.reload()
+        image[IMAGE] = str(source)
+        base_color = image if source.name == BASE_COLOR else base_color
+    if base_color is None and (folder / BASE_COLOR).is_file():
+        base_color = result_images.image(folder, BASE_COLOR)
+    return base_color

@@ -34,18 +34,18 @@ _SOURCE = "scan_relight_painted_over"
 MASK = "unseen"
 
 
-def texture_node(thing: bpy.types.Object) -> bpy.types.ShaderNode | None:
+def texture_node(obj: bpy.types.Object) -> bpy.types.ShaderNode | None:
     """The node whose image an object's Base Color shows; None where it shows one colour."""
-    shader = principled(worn_material(thing))
+    shader = principled(worn_material(obj))
     return image_node(shader.inputs[BASE_COLOR]) if shader else None
 
 
-def painted(thing: bpy.types.Object) -> bpy.types.Image | None:
+def painted(obj: bpy.types.Object) -> bpy.types.Image | None:
     """The artist's image that an object shows, or None."""
-    return thing.get(PAINTED)
+    return obj.get(PAINTED)
 
 
-def own_image(thing: bpy.types.Object, where: str = images.PACK) -> bpy.types.Image:
+def own_image(obj: bpy.types.Object, where: str = images.PACK) -> bpy.types.Image:
     """The artist's image of an object; made where there is none yet, and shown.
 
     Parameters
@@ -60,28 +60,28 @@ def own_image(thing: bpy.types.Object, where: str = images.PACK) -> bpy.types.Im
     StorageError
         The file can't be written.
     """
-    node = texture_node(thing)
+    node = texture_node(obj)
     if node is None:
-        raise BadInputError(f"Object '{thing.name}' has one colour and no texture to paint; choose its colour instead.")
-    if painted(thing) is not None:
-        return painted(thing)
+        raise BadInputError(f"Object '{obj.name}' has one colour and no texture to paint; choose its colour instead.")
+    if painted(obj) is not None:
+        return painted(obj)
     source = node.image
     if source.source == "TILED":
-        raise BadInputError(f"The colour of object '{thing.name}' lies in tiles; run with another atlas to paint it.")
+        raise BadInputError(f"The colour of object '{obj.name}' lies in tiles; run with another atlas to paint it.")
     name, key = f"{source.name.removesuffix('.exr')} painted", path_of(source)
-    own = [one for one in bpy.data.images if one.get(PAINTED) == key and not one.library]
-    image = next((one for one in own if one.size[:] == source.size[:]), None)
+    copies = [copy for copy in bpy.data.images if copy.get(PAINTED) == key and not copy.library]
+    image = next((copy for copy in copies if copy.size[:] == source.size[:]), None)
     if image is None:
         image = array_image(name, image_array(source))
-        image[PAINTED], image[RUN] = key, thing.get(RUN, "")
+        image[PAINTED], image[RUN] = key, obj.get(RUN, "")
         image.use_fake_user = True
         if where == images.FOLDER and bpy.data.filepath:
             _save_beside(image)
-    elif image.get(RUN, "") != thing.get(RUN, ""):
-        _renew(image, source, thing)  # what another run found of this object, which nobody painted
+    elif image.get(RUN, "") != obj.get(RUN, ""):
+        _renew(image, source, obj)  # what another run found of this object, which nobody painted
     image[_SOURCE] = source
-    _show(thing, node, image)
-    thing[PAINTED], thing[_UV] = image, _digest(thing.data)
+    _show(obj, node, image)
+    obj[PAINTED], obj[_UV] = image, _digest(obj.data)
     return image
 
 
@@ -90,45 +90,45 @@ def source_of(image: bpy.types.Image) -> bpy.types.Image:
     return image.get(_SOURCE) or image
 
 
-def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
-    """Let objects show what was found again; how many did not. Only `discard` takes it out of the image too."""
+def restore(objects: Iterable[bpy.types.Object], discard: bool = False) -> int:
+    """Show what was found again; returns how many objects did not. `discard` also removes the paint from the image."""
     count = 0
-    for thing in things:
-        image, node = painted(thing), texture_node(thing)
+    for obj in objects:
+        image, node = painted(obj), texture_node(obj)
         if image is None:
             continue
         if discard and image.get(_SOURCE):
-            _renew(image, image[_SOURCE], thing)
+            _renew(image, image[_SOURCE], obj)
         if node is not None and node.image == image:
-            _show(thing, node, image.get(_SOURCE) or load_image(image[PAINTED]))
+            _show(obj, node, image.get(_SOURCE) or load_image(image[PAINTED]))
         for key in (PAINTED, _UV):
-            del thing[key]
+            del obj[key]
         count += 1
     return count
 
 
-def reapply(thing: bpy.types.Object) -> list[str]:
-    """Show what was painted on an object again whose mesh or material is new; sentences on what no longer fits."""
-    image, node = painted(thing), texture_node(thing)
+def reapply(obj: bpy.types.Object) -> list[str]:
+    """Show what was painted again on an object whose mesh or material is new; warnings on what no longer fits."""
+    image, node = painted(obj), texture_node(obj)
     if image is None or node is None or node.image == image:
         return []
-    if thing.get(_UV) != _digest(thing.data):
+    if obj.get(_UV) != _digest(obj.data):
         return [
-            f"What was painted on '{thing.name}' lies on other texture coordinates than this run's; it is kept as "
+            f"What was painted on '{obj.name}' lies on other texture coordinates than this run's; it is kept as "
             f"image '{image.name}' and not shown."
         ]
     image[_SOURCE] = node.image
-    _show(thing, node, image)
+    _show(obj, node, image)
     return []
 
 
-def _show(thing, node, image) -> None:
-    with our_own(worn_material(thing)):
+def _show(obj, node, image) -> None:
+    with our_own(worn_material(obj)):
         node.image = image
 
 
 def keep_painted() -> None:
-    """Put what was painted since into the packed images or files, as the .blend is about to be saved."""
+    """Save unsaved paint into the packed images or files, as the .blend is about to be saved."""
     for image in bpy.data.images:
         if image.get(PAINTED) and image.is_dirty and not image.library:
             if image.packed_file:
@@ -137,16 +137,16 @@ def keep_painted() -> None:
                 image.save()
 
 
-def unseen_mask(thing: bpy.types.Object) -> np.ndarray:
-    """Where in its atlas no frame saw the surface, (h, w) bool, row 0 at the bottom; raises as `coverage`."""
-    return coverage(thing)[..., 0] < 0.5
+def unseen_mask(obj: bpy.types.Object) -> np.ndarray:
+    """Mask of its atlas where no frame saw the surface, (h, w) bool, row 0 at the bottom; raises as `coverage`."""
+    return coverage(obj)[..., 0] < 0.5
 
 
-def coverage(thing: bpy.types.Object) -> np.ndarray:
+def coverage(obj: bpy.types.Object) -> np.ndarray:
     """The coverage over an object's atlas, (h, w, 3) float32, row 0 at the bottom; raises as `unseen_mask`."""
-    node = texture_node(thing)
+    node = texture_node(obj)
     if node is None:
-        raise BadInputError(f"Object '{thing.name}' has one colour and no texture.")
+        raise BadInputError(f"Object '{obj.name}' has one colour and no texture.")
     image = node.image
     base = Path(path_of(image))
     path = base.with_name(base.name.replace("base_color", "coverage"))
@@ -154,10 +154,10 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
         raise BadInputError(f"'{path}' is missing, so nobody knows what no frame saw; run the recovery again.")
     from ...core.io.exr import read_exr  # not earlier, as all such: Blender's start should not wait for it
 
-    found = np.array(read_exr(path).rgb)[::-1]
-    if found.shape[:2] != (image.size[1], image.size[0]):
+    values = np.array(read_exr(path).rgb)[::-1]
+    if values.shape[:2] != (image.size[1], image.size[0]):
         raise BadInputError(f"'{path}' has another size than image '{image.name}'; restore the object first.")
-    return found
+    return values
 
 
 def was_measured(origin: np.ndarray) -> np.ndarray:
@@ -167,21 +167,21 @@ def was_measured(origin: np.ndarray) -> np.ndarray:
     return np.rint(origin).astype(int) % CLOSED == MEASURED
 
 
-def stencil(thing: bpy.types.Object) -> bpy.types.Image:
+def stencil(obj: bpy.types.Object) -> bpy.types.Image:
     """A picture for Texture Paint's stencil mask: white, that is protected, where any frame saw the surface."""
-    name = f"{painted(thing).name} {MASK}"
+    name = f"{painted(obj).name} {MASK}"
     if earlier := bpy.data.images.get(name):
         bpy.data.images.remove(earlier)
-    return array_image(name, (~unseen_mask(thing)).astype(np.float32), DATA)
+    return array_image(name, (~unseen_mask(obj)).astype(np.float32), DATA)
 
 
-def paint(context: bpy.types.Context, thing: bpy.types.Object, where: str, colour, masked: bool = True) -> None:
+def paint(context: bpy.types.Context, obj: bpy.types.Object, where: str, colour, masked: bool = True) -> None:
     """Canvas, stencil mask and brush for the active object, then Blender's own Texture Paint.
 
     Parameters
     ----------
     context : bpy.types.Context
-        `thing` is its active object.
+        `obj` is its active object.
     where : str
         Where the canvas goes, see `own_image`.
     colour : (3,) of float or None
@@ -195,16 +195,16 @@ def paint(context: bpy.types.Context, thing: bpy.types.Object, where: str, colou
         As of `own_image` and `unseen_mask`.
     """
     if masked:
-        unseen_mask(thing)  # raises before anything is changed
+        unseen_mask(obj)  # raises before anything is changed
     tools = context.scene.tool_settings
     settings = tools.image_paint
-    settings.mode, settings.canvas = "IMAGE", own_image(thing, where)
-    layers = thing.data.uv_layers
+    settings.mode, settings.canvas = "IMAGE", own_image(obj, where)
+    layers = obj.data.uv_layers
     layers.active = layers[ATLAS_UV]
     settings.use_stencil_layer = masked
     if masked:
-        settings.stencil_image, settings.invert_stencil = stencil(thing), False
-        thing.data.uv_layer_stencil = layers[ATLAS_UV]
+        settings.stencil_image, settings.invert_stencil = stencil(obj), False
+        obj.data.uv_layer_stencil = layers[ATLAS_UV]
     bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
     unified = getattr(settings, "unified_paint_settings", None) or tools.unified_paint_settings
     brush = unified if unified.use_unified_color else settings.brush
@@ -214,7 +214,7 @@ def paint(context: bpy.types.Context, thing: bpy.types.Object, where: str, colou
         brush.color = [min(max(c, 0.0), 1.0) for c in (colour.from_scene_linear_to_srgb() if gamma else colour)]
 
 
-def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
+def fill(objects: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
     """Fill what no frame saw of objects from the measured spots around, on the artist's image.
 
     Each spot becomes the mean of the `LEVELS.neighbours` measured ones of its object that lie nearest and face alike;
@@ -233,45 +233,48 @@ def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[
         As of `own_image` and `unseen_mask`; nothing is changed then.
     """
     groups: dict[str, list] = {}
-    passed: dict[str, list[str]] = {}
-    for thing in things:
-        node = texture_node(thing)
+    skipped: dict[str, list[str]] = {}
+    for obj in objects:
+        node = texture_node(obj)
         if node is None:
-            passed.setdefault("one colour, so there is nothing to fill", []).append(thing.name)
+            skipped.setdefault("one colour, so there is nothing to fill", []).append(obj.name)
         else:
-            groups.setdefault(path_of(node.image), []).append(thing)
-    seen = {path: coverage(some[0]) for path, some in groups.items()}
-    count = sum(_fill(some, seen[path], where, passed) for path, some in groups.items())
-    return count, list(sentences(*((names, why) for why, names in passed.items())))
+            groups.setdefault(path_of(node.image), []).append(obj)
+    coverages = {path: coverage(members[0]) for path, members in groups.items()}
+    count = sum(_fill(members, coverages[path], where, skipped) for path, members in groups.items())
+    return count, list(sentences(*((names, why) for why, names in skipped.items())))
 
 
-def _fill(things, seen, where, passed) -> int:
-    """`fill` for objects that show the same image, whose coverage is `seen`."""
+def _fill(objects, coverage_map, where, skipped) -> int:
+    """`fill` for objects that show the same image, whose coverage is `coverage_map`."""
     from scipy.spatial import cKDTree
 
-    owners = _sharing(things[0])
-    atlas = _elements(owners, seen.shape[0])
-    observed, quality = (seen[..., k].ravel()[atlas.texel] for k in (0, 2))
-    number = {thing: k for k, thing in enumerate(owners)}
+    owners = _in_same_atlas(objects[0])
+    atlas = _elements(owners, coverage_map.shape[0])
+    observed, quality = (coverage_map[..., k].ravel()[atlas.texel] for k in (0, 2))
+    number = {obj: k for k, obj in enumerate(owners)}
     filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
-    for thing in things:
-        own = np.flatnonzero(atlas.object_id == number[thing])
-        wanted, measured = own[observed[own] < 0.5], own[(observed[own] >= 0.5) & was_measured(quality[own])]
-        if not len(wanted) or not len(measured):
-            why = "frames saw all of it" if not len(wanted) else "no spot of it was measured to fill from"
-            passed.setdefault(why, []).append(thing.name)
+    for obj in objects:
+        elements = np.flatnonzero(atlas.object_id == number[obj])
+        unseen, measured = (
+            elements[observed[elements] < 0.5],
+            elements[(observed[elements] >= 0.5) & was_measured(quality[elements])],
+        )
+        if not len(unseen) or not len(measured):
+            why = "frames saw all of it" if not len(unseen) else "no spot of it was measured to fill from"
+            skipped.setdefault(why, []).append(obj.name)
             continue
-        image = own_image(thing, where)  # of all of them before it is read, as each may renew its part
-        spots[thing] = wanted, measured
-    flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1) if spots else None
-    for wanted, measured in spots.values():
-        tree, nearest = cKDTree(atlas.place(measured)), min(LEVELS.neighbours, len(measured))
+        image = own_image(obj, where)  # of all of them before it is read, as each may renew its part
+        spots[obj] = unseen, measured
+    flat = image_array(image).reshape(coverage_map.shape[0] * coverage_map.shape[1], -1) if spots else None
+    for unseen, measured in spots.values():
+        tree, neighbours = cKDTree(atlas.place(measured)), min(LEVELS.neighbours, len(measured))
         distance, near = (
-            found.reshape(len(wanted), -1) for found in tree.query(atlas.place(wanted), nearest, workers=-1)
+            values.reshape(len(unseen), -1) for values in tree.query(atlas.place(unseen), neighbours, workers=-1)
         )
         weight = 1 / (distance**2 + atlas.texel_edge**2)
-        value[wanted] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
-        filled[wanted] = True
+        value[unseen] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
+        filled[unseen] = True
     if spots:
         texels = np.flatnonzero(filled[atlas.padding])  # the gutter beside them too
         flat[texels, :3] = value[atlas.padding[texels]]
@@ -281,24 +284,24 @@ def _fill(things, seen, where, passed) -> int:
     return int(filled.sum())
 
 
-def room_of(thing: bpy.types.Object) -> list[bpy.types.Object]:
+def room_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
     """All objects of a room in the scenes that show one of them."""
-    everything = dict.fromkeys(one for scene in thing.users_scene for one in scene.objects)
-    return [one for one in everything if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)]
+    candidates = dict.fromkeys(other for scene in obj.users_scene for other in scene.objects)
+    return [other for other in candidates if OBJECT_ID in other and other.get(RESULT) == obj.get(RESULT)]
 
 
-def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
+def _in_same_atlas(obj: bpy.types.Object) -> list[bpy.types.Object]:
     """All objects of the room whose texture coordinates lie in the same atlas."""
-    return [one for one in room_of(thing) if one.type == "MESH" and ATLAS_UV in one.data.uv_layers]
+    return [other for other in room_of(obj) if other.type == "MESH" and ATLAS_UV in other.data.uv_layers]
 
 
-def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
+def _elements(objects: list[bpy.types.Object], size: int) -> Atlas:
     from ...core.scene.elements import make_atlas
 
     vertices, triangles, uv, number, first = [], [], [], [], 0
-    for k, thing in enumerate(things):
-        data = thing.data
-        vertices.append(vertices_of(data, thing.matrix_world).astype(np.float32))
+    for k, obj in enumerate(objects):
+        data = obj.data
+        vertices.append(vertices_of(data, obj.matrix_world).astype(np.float32))
         triangles.append(triangles_of(data) + first)
         uv.append(layer_of(data, ATLAS_UV)[triangles_of(data, "loops")])
         number.append(np.full(len(triangles[-1]), k, np.int32))
@@ -306,13 +309,13 @@ def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
     return make_atlas(Mesh(*map(np.concatenate, (vertices, triangles, number))), np.concatenate(uv), size)
 
 
-def _renew(image, source, thing) -> None:
+def _renew(image, source, obj) -> None:
     """Copy an object's texels from the result's image."""
-    owners = _sharing(thing)
+    owners = _in_same_atlas(obj)
     atlas = _elements(owners, image.size[0])
-    own = atlas.object_id[atlas.padding] == owners.index(thing)
+    mask = atlas.object_id[atlas.padding] == owners.index(obj)
     pixels = image_array(image)
-    pixels.reshape(-1, pixels.shape[2])[own, :3] = image_array(source).reshape(len(own), -1)[own, :3]
+    pixels.reshape(-1, pixels.shape[2])[mask, :3] = image_array(source).reshape(len(mask), -1)[mask, :3]
     _show_pixels(image, pixels)
 
 

@@ -77,7 +77,7 @@ def test_a_device_that_is_not_there_is_the_processor_and_told(scene):
         pytest.skip("this machine has graphics cards of all kinds")
     scene.cycles.device = "GPU"
     assert "the processor renders" in render_device.use_device(scene, f"{kinds[0]}=some|card")
-    assert scene.cycles.device == "CPU" and render_device.told_device(scene) == render_device.CPU
+    assert scene.cycles.device == "CPU" and render_device.current_device(scene) == render_device.CPU
     assert render_device.use_device(scene, "cpu") == ""
     with pytest.raises(BadInputError, match="no device 'abacus'"):
         render_device.use_device(scene, "abacus")
