@@ -9,70 +9,74 @@ KINDS = tuple(
     "scenes collections objects meshes curves armatures cameras lights shape_keys materials worlds node_groups images "
     "textures actions texts".split()
 )
-"""Owners come before what they own."""
+"""Kinds of datablocks; users come before what they use."""
 
 
-class Made:
-    """What has been added to the open file since this was made."""
+class AddedData:
+    """The datablocks that were added to the open file since this was made."""
 
     def __init__(self):
-        self._before = {one.session_uid for kind in KINDS for one in getattr(bpy.data, kind)}
+        self._before = {datablock.session_uid for kind in KINDS for datablock in getattr(bpy.data, kind)}
 
     def new(self, kind: str) -> list:
-        """What is new among one of `KINDS`."""
-        return [one for one in getattr(bpy.data, kind) if one.session_uid not in self._before]
+        """The new datablocks of one of `KINDS`."""
+        return [datablock for datablock in getattr(bpy.data, kind) if datablock.session_uid not in self._before]
 
     def remove(self) -> None:
-        """Take all of it away, but for pictures that what was there shows already."""
+        """Remove all of them, except images that older data shows."""
         for kind in KINDS:
-            found = [one for one in self.new(kind) if kind != "images" or one.users == one.use_fake_user]
-            if found:
-                bpy.data.batch_remove(found)
+            removable = [
+                datablock
+                for datablock in self.new(kind)
+                if kind != "images" or datablock.users == datablock.use_fake_user
+            ]
+            if removable:
+                bpy.data.batch_remove(removable)
 
     def remove_unused(self, also: Iterable[int] = ()) -> None:
-        """Take away what nothing uses: of what is new, and of the data whose `session_uid` is in `also`."""
+        """Remove unused datablocks: of the new ones, and of those whose `session_uid` is in `also`."""
         also = set(also)
         for kind in KINDS[1:]:
-            while found := [
-                one
-                for one in getattr(bpy.data, kind)
-                if (one.session_uid not in self._before or one.session_uid in also)
-                and not one.users
-                and not one.library
+            while unused := [
+                datablock
+                for datablock in getattr(bpy.data, kind)
+                if (datablock.session_uid not in self._before or datablock.session_uid in also)
+                and not datablock.users
+                and not datablock.library
             ]:
-                bpy.data.batch_remove(found)
+                bpy.data.batch_remove(unused)
 
 
 @contextmanager
-def scene_apart(name: str) -> Iterator[tuple[bpy.types.Scene, Made]]:
-    """A scene of its own; it goes with all that came into the file meanwhile, and nothing else changes."""
-    made = Made()
+def scene_apart(name: str) -> Iterator[tuple[bpy.types.Scene, AddedData]]:
+    """A temporary scene, removed at the end with everything that was added meanwhile; nothing else changes."""
+    added = AddedData()
     try:
-        yield bpy.data.scenes.new(name), made
+        yield bpy.data.scenes.new(name), added
     finally:
-        made.remove()
+        added.remove()
 
 
-def _known(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:
-    """The scene's collection `name`, however Blender numbered it."""
-    return next((part for part in scene.collection.children if part.name.split(".")[0] == name), None)
+def _find_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:
+    """The scene's collection `name`, with any number that Blender gave it."""
+    return next((collection for collection in scene.collection.children if collection.name.split(".")[0] == name), None)
 
 
 def own_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     """The scene's collection `name`; made where absent."""
-    part = _known(scene, name)
-    if part is None:
-        part = bpy.data.collections.new(name)
-        scene.collection.children.link(part)
-    return part
+    collection = _find_collection(scene, name)
+    if collection is None:
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+    return collection
 
 
-def remove_own(scene: bpy.types.Scene, name: str, things: list[bpy.types.Object]) -> int:
-    """Take things away with their data, and the collection `name` once it is empty; returns how many."""
-    data = {thing.data for thing in things}
-    bpy.data.batch_remove(things)
-    bpy.data.batch_remove([one for one in data if not one.users])
-    part = _known(scene, name)
-    if part is not None and not part.all_objects:
-        bpy.data.collections.remove(part)
-    return len(things)
+def remove_own(scene: bpy.types.Scene, name: str, objects: list[bpy.types.Object]) -> int:
+    """Remove objects with their data, and the collection `name` once it is empty; returns how many."""
+    data = {obj.data for obj in objects}
+    bpy.data.batch_remove(objects)
+    bpy.data.batch_remove([datablock for datablock in data if not datablock.users])
+    collection = _find_collection(scene, name)
+    if collection is not None and not collection.all_objects:
+        bpy.data.collections.remove(collection)
+    return len(objects)

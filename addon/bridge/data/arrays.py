@@ -11,12 +11,12 @@ def read(items: bpy.types.bpy_prop_collection, name: str, width: int = 1, kind: 
     return values if width == 1 else values.reshape(-1, width)
 
 
-def vertices_of(data: bpy.types.Mesh, place=None) -> np.ndarray:
-    """Its vertices, (v, 3): float32 as it has them; float64 for a mesh that stands at `place`, a 4 x 4 matrix."""
+def vertices_of(data: bpy.types.Mesh, matrix_world=None) -> np.ndarray:
+    """Vertices of a mesh, (v, 3): float32 in its own space; float64 in world space with `matrix_world` (4 x 4)."""
     values = read(data.vertices, "co", 3)
-    if place is None:
+    if matrix_world is None:
         return values
-    matrix = np.array(place, np.float64)
+    matrix = np.array(matrix_world, np.float64)
     return values.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
@@ -26,10 +26,10 @@ def faces_of(data: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     return starts, read(data.loops, "vertex_index", kind=np.int32)
 
 
-def triangles_of(data: bpy.types.Mesh, of: str = "vertices") -> np.ndarray:
-    """The triangles that its faces are cut into: their vertices, or corners ('loops'); (t, 3) int32."""
+def triangles_of(data: bpy.types.Mesh, attribute: str = "vertices") -> np.ndarray:
+    """The triangles that a mesh's faces are cut into: their vertices, or corners ('loops'); (t, 3) int32."""
     data.calc_loop_triangles()
-    return read(data.loop_triangles, of, 3, np.int32)
+    return read(data.loop_triangles, attribute, 3, np.int32)
 
 
 def layer_of(data: bpy.types.Mesh, name: str) -> np.ndarray:

@@ -29,8 +29,8 @@ FRAME_INDEX = "frame_index"
 _SENSOR: Unit[float] = 36.0
 _WIDE = np.radians(80)
 """A lens that sees further than this from its axis is no perspective."""
-_TOLD: Shown[float] = 0.5
-"""Pixels off from which on a lens is told of."""
+_REPORTED_ERROR: Shown[float] = 0.5
+"""Pixels of error from which on a lens is reported."""
 _GRID = 33
 
 
@@ -50,26 +50,26 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, firs
         frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one, and `TURNED` is
         there where the picture is to be shown as its EXIF turns it.
     """
-    made = []
+    cameras = []
     for index, frame in enumerate(frames, first):
-        thing = make_view(frame.name, frame.camera, collection)
-        thing[FRAME_INDEX] = index
-        thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
+        camera = make_view(frame.name, frame.camera, collection)
+        camera[FRAME_INDEX] = index
+        camera["frame_path"], camera["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
         if frame.turned:
-            thing[TURNED] = True
-        made.append(thing)
-    return made
+            camera[TURNED] = True
+        cameras.append(camera)
+    return cameras
 
 
-def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = True) -> None:
+def use_camera(scene: bpy.types.Scene, camera: bpy.types.Object, size: bool = True) -> None:
     """Render through one of `make_cameras`: active camera and, with `size`, the picture's size and shape of pixels."""
     if size:
         render = scene.render
-        render.resolution_x, render.resolution_y = int(thing["width"]), int(thing["height"])
+        render.resolution_x, render.resolution_y = int(camera["width"]), int(camera["height"])
         render.resolution_percentage = 100
-        render.pixel_aspect_x, render.pixel_aspect_y = _pixel(thing)
-    scene.camera = thing
-    show_camera(scene, thing)
+        render.pixel_aspect_x, render.pixel_aspect_y = _pixel(camera)
+    scene.camera = camera
+    show_camera(scene, camera)
 
 
 def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
@@ -78,52 +78,55 @@ def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
     centres = mesh.vertices[mesh.triangles].mean(1)
     middles = np.stack([np.bincount(owner, centres[:, axis]) for axis in range(3)], -1) / np.bincount(owner)[:, None]
 
-    def shown(camera: Camera) -> int:
+    def visible_count(camera: Camera) -> int:
         pixels, depth = camera.project(middles)
         inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
         return int(((depth > 0) & inside.all(1)).sum())
 
-    return int(np.argmax([shown(frame.camera) for frame in frames]))
+    return int(np.argmax([visible_count(frame.camera) for frame in frames]))
 
 
-def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+def show_camera(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Show one camera of a room whose others are hidden: Blender draws no picture behind a hidden one."""
-    top = next(
-        (one for one in scene.collection.children_recursive if CAPTURE in one and thing in set(one.all_objects)), None
+    room = next(
+        (
+            collection
+            for collection in scene.collection.children_recursive
+            if CAPTURE in collection and camera in set(collection.all_objects)
+        ),
+        None,
     )
-    if top is None or thing.name in top.objects:
+    if room is None or camera.name in room.objects:
         return
-    for other in [one for one in top.objects if FRAME_INDEX in one and len(one.users_collection) > 1]:
-        top.objects.unlink(other)
-    top.objects.link(thing)
+    for obj in [obj for obj in room.objects if FRAME_INDEX in obj and len(obj.users_collection) > 1]:
+        room.objects.unlink(obj)
+    room.objects.link(camera)
 
 
-def shows_as_framed(scene: bpy.types.Scene, thing: bpy.types.Object) -> bool:
+def shows_as_framed(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     """Whether a scene's picture has the sides and pixel shape that a frame's camera was made for, at any size."""
     render = scene.render
-    wide, high = _pixel(thing)
-    wanted = thing["width"] * wide / (thing["height"] * high)
-    shown = render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
-    return abs(shown / wanted - 1) < 1e-3
+    wide, high = _pixel(camera)
+    expected = camera["width"] * wide / (camera["height"] * high)
+    actual = render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
+    return abs(actual / expected - 1) < 1e-3
 
 
-def _pixel(thing: bpy.types.Object) -> tuple[float, float]:
+def _pixel(camera: bpy.types.Object) -> tuple[float, float]:
     """Width and height of a pixel as Blender takes them: from 1 on."""
-    aspect = float(thing["pixel_aspect"])
+    aspect = float(camera["pixel_aspect"])
     return max(1.0, 1 / aspect), max(1.0, aspect)
 
 
 def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The cameras of a scene that `make_cameras` made, one room after the other, in the capture's order."""
-    found = [
-        thing
-        for thing in scene.objects
-        if thing.type == "CAMERA" and "pixel_aspect" in thing and thing.get(FRAME_INDEX, 0) >= 0
+    cameras = [
+        obj for obj in scene.objects if obj.type == "CAMERA" and "pixel_aspect" in obj and obj.get(FRAME_INDEX, 0) >= 0
     ]
-    return sorted(found, key=lambda thing: (thing.get(CAPTURE, ""), thing.get(FRAME_INDEX, 0)))
+    return sorted(cameras, key=lambda obj: (obj.get(CAPTURE, ""), obj.get(FRAME_INDEX, 0)))
 
 
-def differing(frames: Iterable[Frame]) -> str:
+def size_warning(frames: Iterable[Frame]) -> str:
     """One sentence if the frames don't share one size and pixel shape, which scenes have and not cameras; '' if so."""
     kinds = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
     if len(kinds) < 2:
@@ -134,36 +137,38 @@ def differing(frames: Iterable[Frame]) -> str:
     )
 
 
-def kept_lens(thing: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
+def kept_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
     """The lens that `make_cameras` left with a camera, and its fx, fy, cx, cy; None where it left none."""
     try:
-        lens, pixels = json.loads(thing[LENS])
+        lens, pixels = json.loads(camera[LENS])
         fx, fy, cx, cy = map(float, pixels)
         return lens_of(lens), (fx, fy, cx, cy)
     except (KeyError, TypeError, ValueError):
         return None
 
 
-def unlike(frames: Iterable[Frame]) -> str:
-    """One sentence if Blender has no camera like some of the frames' lenses ('' if it has): how far they are off."""
+def lens_warning(frames: Iterable[Frame]) -> str:
+    """One sentence if Blender's cameras can't have some of the frames' lenses ('' if they can): the error in pixels."""
     bent = [frame.camera for frame in frames if frame.camera.lens is not None]
     kinds = {(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens): c for c in bent}
-    far, camera = max(((off_by(one), one) for one in kinds.values()), key=lambda pair: pair[0], default=(0.0, None))
-    if far < _TOLD:
+    error, camera = max(
+        ((max_pixel_error(c), c) for c in kinds.values()), key=lambda pair: pair[0], default=(0.0, None)
+    )
+    if error < _REPORTED_ERROR:
         return ""
     return (
         f"Blender has no camera with a lens such as {camera.lens.name}: its cameras show what the frames show "
-        f"up to {far:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens."
+        f"up to {error:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens."
     )
 
 
-def off_by(camera: Camera) -> float:
-    """Pixels by which the Blender camera's picture is off the camera's own, at most."""
+def max_pixel_error(camera: Camera) -> float:
+    """Largest distance in pixels between the Blender camera's picture and the camera's own."""
     y, x = (np.linspace(0, extent, _GRID) for extent in (camera.height, camera.width))
     pixels = np.stack([i.ravel() for i in np.meshgrid(x, y)], -1)
     points = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    seen = camera.lens.unproject(points)[1]
-    points = points[seen]
+    inside = camera.lens.unproject(points)[1]
+    points = points[inside]
     if isinstance(camera.lens, Equirectangular):
         return 0.0
     if _is_wide(camera):
@@ -174,9 +179,9 @@ def off_by(camera: Camera) -> float:
         rays = np.column_stack([across, np.cos(theta)])
     else:
         rays = np.column_stack([points, np.ones(len(points))])
-    shown, known = camera.lens.project(rays)
-    off = np.hypot(*((shown - points) * (camera.fx, camera.fy))[known].T)
-    return float(off.max(initial=0)) if known.any() else float("inf")
+    projected, valid = camera.lens.project(rays)
+    error = np.hypot(*((projected - points) * (camera.fx, camera.fy))[valid].T)
+    return float(error.max(initial=0)) if valid.any() else float("inf")
 
 
 def _is_wide(camera: Camera) -> bool:
@@ -194,9 +199,9 @@ def _angles(camera: Camera) -> np.ndarray:
     reach = np.linalg.norm((corners - (camera.cx, camera.cy)) / (camera.fx, camera.fy), axis=1).max()
     radius, phi = np.meshgrid(np.linspace(0, reach, 401)[1:], np.arange(16) * (np.pi / 8), indexing="ij")
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)], -1).reshape(-1, 2)
-    rays, seen = camera.lens.unproject(points)
+    rays, valid = camera.lens.unproject(points)
     theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]).reshape(radius.shape)
-    good = seen.reshape(radius.shape).all(1)
+    good = valid.reshape(radius.shape).all(1)
     radius, theta = radius[good, 0], theta[good].mean(1)
     millimetres = camera.fx * _SENSOR / camera.width * radius
     pixels = 1 / np.maximum(np.gradient(theta, radius), 1e-6)  # how much a wrong angle counts
@@ -212,8 +217,8 @@ def _rim(camera: Camera) -> float:
         return widest
     phi = np.arange(64) * (np.pi / 32)
     rim = np.stack([camera.lens.across * np.cos(phi), camera.lens.down * np.sin(phi)], -1)
-    rays, seen = camera.lens.lens.unproject(rim)
-    return float(np.arccos(rays[:, 2].clip(-1, 1)).max()) if seen.all() else widest
+    rays, valid = camera.lens.lens.unproject(rim)
+    return float(np.arccos(rays[:, 2].clip(-1, 1)).max()) if valid.all() else widest
 
 
 def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
@@ -252,13 +257,13 @@ def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bp
     data.clip_start, data.clip_end = 0.01, 1000.0
     data.display_size = 0.15
     data.passepartout_alpha = 1.0  # what lies outside the picture Cycles' viewport then needn't compute
-    thing = bpy.data.objects.new(name, data)
-    thing.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
-    thing["width"], thing["height"], thing["pixel_aspect"] = camera.width, camera.height, aspect
+    obj = bpy.data.objects.new(name, data)
+    obj.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
+    obj["width"], obj["height"], obj["pixel_aspect"] = camera.width, camera.height, aspect
     if camera.lens is not None:
-        thing[LENS] = json.dumps([told_lens(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
-    collection.objects.link(thing)
-    return thing
+        obj[LENS] = json.dumps([told_lens(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
+    collection.objects.link(obj)
+    return obj
 
 
 TRACK = "Scan Relight track"
@@ -271,28 +276,28 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
     """The camera along those of the frames, the timeline's frame k showing the k-th; None of fewer than two."""
     if len(cameras) < 2:
         return None
-    thing = cameras[0].copy()
-    thing.name, thing.data = TRACK, cameras[0].data.copy()
-    thing.data.name = TRACK
+    track = cameras[0].copy()
+    track.name, track.data = TRACK, cameras[0].data.copy()
+    track.data.name = TRACK
     for name in ("frame_path", "frame_exposure", TURNED):
-        if name in thing:
-            del thing[name]
-    thing[FRAME_INDEX] = NO_FRAME
-    thing.rotation_mode = "QUATERNION"
-    before = None
+        if name in track:
+            del track[name]
+    track[FRAME_INDEX] = NO_FRAME
+    track.rotation_mode = "QUATERNION"
+    previous = None
     for frame, camera in enumerate(cameras, 1):
-        place, turn, _ = camera.matrix_basis.decompose()
-        if before is not None:
-            turn.make_compatible(before)  # of its two signs the one that turns the shorter way
-        thing.location, thing.rotation_quaternion, before = place, turn, turn
-        thing.keyframe_insert("location", frame=frame)
-        thing.keyframe_insert("rotation_quaternion", frame=frame)
-    thing.animation_data.action.name = TRACK
-    thing.matrix_basis = cameras[0].matrix_basis
-    collection.objects.link(thing)
-    return thing
+        location, rotation, _ = camera.matrix_basis.decompose()
+        if previous is not None:
+            rotation.make_compatible(previous)  # of its two signs the one that turns the shorter way
+        track.location, track.rotation_quaternion, previous = location, rotation, rotation
+        track.keyframe_insert("location", frame=frame)
+        track.keyframe_insert("rotation_quaternion", frame=frame)
+    track.animation_data.action.name = TRACK
+    track.matrix_basis = cameras[0].matrix_basis
+    collection.objects.link(track)
+    return track
 
 
 def track_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The cameras of a scene that go along the track of a capture."""
-    return [thing for thing in scene.objects if thing.type == "CAMERA" and thing.get(FRAME_INDEX, 0) == NO_FRAME]
+    return [obj for obj in scene.objects if obj.type == "CAMERA" and obj.get(FRAME_INDEX, 0) == NO_FRAME]

@@ -81,19 +81,19 @@ def load_parts(
     folder: Path, files: dict[int, str], room: str, descriptions: dict[int, ObjectMaterial]
 ) -> dict[int, bpy.types.Image]:
     """The images of a result folder's `Parts`, by object; objects of one file share its image."""
-    found: dict[str, bpy.types.Image] = {}
+    images: dict[str, bpy.types.Image] = {}
     for number, file in files.items():
-        if file not in found:
+        if file not in images:
             name = image_name(room, "base_color tiles") if UDIM in file else f"{descriptions[number].name} base color"
-            found[file] = load_image(folder / file, name, keep=False)
-            found[file][UV_MAP] = PARTS_UV
-    return {number: found[file] for number, file in files.items()}
+            images[file] = load_image(folder / file, name, keep=False)
+            images[file][UV_MAP] = PARTS_UV
+    return {number: images[file] for number, file in files.items()}
 
 
 def image_name(room: str, path: Path | str) -> str:
     """What an image file of a room is called: 'kitchen base color', so that two rooms in one file are told apart."""
-    what = Path(path).stem.replace("_", " ")
-    return f"{cut(room, LONGEST - 8) or 'room'} {what}"
+    label = Path(path).stem.replace("_", " ")
+    return f"{cut(room, LONGEST - 8) or 'room'} {label}"
 
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:

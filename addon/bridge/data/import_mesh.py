@@ -16,7 +16,7 @@ from ..refused import reason_of
 from .added import scene_apart
 from .arrays import layer_of, read, triangles_of, vertices_of
 from .names import split_number
-from .shown import shown
+from .shown import in_window
 
 PART, MATERIAL = re.compile(r"^part (\d+)"), re.compile(r"^material (\d+)")
 
@@ -35,11 +35,11 @@ def import_mesh(path: Path) -> RawMesh:
     try:
         with (
             tempfile.TemporaryDirectory(prefix="scan_relight_") as folder,
-            scene_apart("Scan Relight import") as (scene, made),
+            scene_apart("Scan Relight import") as (scene, added),
         ):
             placed = _import(path, Path(folder), scene)
             scene.view_layers[0].update()  # world matrices
-            parts = _parts(made.new("objects"), placed)  # not all_objects: making that list takes its length squared
+            parts = _parts(added.new("objects"), placed)  # not all_objects: making that list takes its length squared
     except OSError as error:
         reason = error.strerror or error
         raise BadInputError(
@@ -54,7 +54,7 @@ def import_mesh(path: Path) -> RawMesh:
 
 def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
     """Run Blender's importer on a copy of `path`, naming nothing else; how each 'part N' of it is called and lies."""
-    with shown(scene):
+    with in_window(scene):
         try:
             if path.suffix.lower() == ".obj":
                 copy, named, placed = copy_obj(path, folder)
@@ -84,34 +84,34 @@ class _Part(NamedTuple):
     material: np.ndarray
 
 
-def _parts(things: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
+def _parts(objects: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
     """The parts by their names; those of one name in the file's order."""
     places: dict[int, list[tuple[int, Placed]]] = {}
-    for order, one in enumerate(placed):
-        places.setdefault(one.mesh, []).append((order, one))
-    found = []
-    for thing in things:
-        triangles = triangles_of(thing.data) if thing.type == "MESH" else ()
+    for order, placement in enumerate(placed):
+        places.setdefault(placement.mesh, []).append((order, placement))
+    parts = []
+    for obj in objects:
+        triangles = triangles_of(obj.data) if obj.type == "MESH" else ()
         if not len(triangles):
             continue
-        layer, known = thing.data.uv_layers.active, PART.match(thing.name)
-        uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
-        vertices, material = vertices_of(thing.data, thing.matrix_world), _materials(thing.data)
-        unnamed = [(len(found), Placed(0, thing.name, np.eye(4)))]
-        for order, one in places.get(int(known[1]), unnamed) if known else unnamed:
+        layer, match = obj.data.uv_layers.active, PART.match(obj.name)
+        uv = layer and layer_of(obj.data, layer.name)[triangles_of(obj.data, "loops")]
+        vertices, material = vertices_of(obj.data, obj.matrix_world), _materials(obj.data)
+        unnamed = [(len(parts), Placed(0, obj.name, np.eye(4)))]
+        for order, placement in places.get(int(match[1]), unnamed) if match else unnamed:
             corners = triangles, uv
-            if np.linalg.det(one.matrix[:3, :3]) < 0:  # its triangles are wound the other way
+            if np.linalg.det(placement.matrix[:3, :3]) < 0:  # its triangles are wound the other way
                 corners = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
-            name, number = split_number(one.name)
-            part = _Part(name, vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3], *corners, material)
-            found.append(((name, number, order), part))
-    return [part for _, part in sorted(found, key=lambda one: one[0])]
+            name, number = split_number(placement.name)
+            part = _Part(name, vertices @ placement.matrix[:3, :3].T + placement.matrix[:3, 3], *corners, material)
+            parts.append(((name, number, order), part))
+    return [part for _, part in sorted(parts, key=lambda item: item[0])]
 
 
 def _materials(data: bpy.types.Mesh) -> np.ndarray:
     """The number in the file of each triangle's material, -1 for none, (t,) int32."""
-    known = [MATERIAL.match(one.name) if one else None for one in data.materials]
-    number = np.array([int(one[1]) if one else -1 for one in known] or [-1], np.int32)
+    matches = [MATERIAL.match(material.name) if material else None for material in data.materials]
+    number = np.array([int(match[1]) if match else -1 for match in matches] or [-1], np.int32)
     return number[np.clip(read(data.loop_triangles, "material_index", kind=np.int32), 0, len(number) - 1)]
 
 
@@ -122,7 +122,7 @@ def _joined(parts: list[_Part], name: str) -> RawMesh:
     uv = None
     if any(part.uv is not None for part in parts):
         blank = [np.zeros((len(part.triangles), 3, 2), np.float32) for part in parts]
-        uv = np.concatenate([other if part.uv is None else part.uv for part, other in zip(parts, blank)])
+        uv = np.concatenate([zeros if part.uv is None else part.uv for part, zeros in zip(parts, blank)])
     material = np.concatenate([part.material for part in parts])
     if len(parts) == 1:
         return RawMesh(vertices, triangles, uv=uv, name=name, material=material)

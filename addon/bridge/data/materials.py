@@ -14,8 +14,8 @@ MODEL = "scan_relight_model"
 REPEATS = "scan_relight_repeats"
 """Custom property of a picture: it goes on beyond its edges, as one tile does for coordinates on that tile."""
 _ALPHA, _F0, _TRANSMISSION = "scan_relight_alpha", "scan_relight_f0", "scan_relight_transmission"
-_BEFORE = {_ALPHA: "scan_relight_phi", _F0: "scan_relight_psi"}
-"""What version 0.1 called them."""
+_OLD_NAMES = {_ALPHA: "scan_relight_phi", _F0: "scan_relight_psi"}
+"""Their names in version 0.1."""
 
 BASE_COLOR = "Base Color"
 METALLIC = "Metallic"
@@ -34,7 +34,7 @@ def brdf_of(material: bpy.types.Material | None) -> Brdf | None:
 
 def f0_of(material: bpy.types.Material) -> float | None:
     """F0 as it was fitted; None where there is no lobe, or a coloured one: that is the material's colour."""
-    return material.get(_F0, material.get(_BEFORE[_F0]))
+    return material.get(_F0, material.get(_OLD_NAMES[_F0]))
 
 
 def make_material(
@@ -64,35 +64,35 @@ def dress(
     base_color: bpy.types.Image | None = None,
     one_sided: bool = False,
 ) -> bpy.types.Material:
-    """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
-    shown = description.model.principled(description)
+    """`make_material` in an existing material: its nodes are replaced, its name and users stay."""
+    values = description.model.principled(description)
     shader = _fresh_principled(material)
-    value = shader.inputs
+    inputs = shader.inputs
     shader.distribution = "GGX"  # the fitted lobe is single scattering
-    _set(value, METALLIC, shown.metallic, ALPHA, shown.alpha, SPECULAR_LEVEL, shown.specular_level, IOR, shown.ior)
-    _set(value, ROUGHNESS, shown.roughness, BASE_COLOR, (*(shown.base_color or (0.5,) * 3), 1))
-    for name, number in shown.further.items():
-        if name in value:
-            value[name].default_value = number
-    if shown.base_color is None and base_color is not None:
-        _show_image(base_color, value[BASE_COLOR])
-    if shown.emission is not None:
-        _emit(value, shown.emission)
+    _set(inputs, METALLIC, values.metallic, ALPHA, values.alpha, SPECULAR_LEVEL, values.specular_level, IOR, values.ior)
+    _set(inputs, ROUGHNESS, values.roughness, BASE_COLOR, (*(values.base_color or (0.5,) * 3), 1))
+    for name, number in values.further.items():
+        if name in inputs:
+            inputs[name].default_value = number
+    if values.base_color is None and base_color is not None:
+        _show_image(base_color, inputs[BASE_COLOR])
+    if values.emission is not None:
+        _emit(inputs, values.emission)
         if one_sided:
-            _front_only(value[EMISSION_COLOR])
+            _front_only(inputs[EMISSION_COLOR])
     _connect(shader)
     material[MODEL] = description.model.name
-    told = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
-    for name in (*told, *_BEFORE.values()):
+    properties = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
+    for name in (*properties, *_OLD_NAMES.values()):
         material.pop(name, None)
-    for name, number in told.items():
+    for name, number in properties.items():
         if isinstance(number, (int, float)):
             material[name] = float(number)
     return material
 
 
 def let_light_through(material: bpy.types.Material) -> None:
-    """Make a lamp's material shine from where nothing is: it reflects nothing and stops no light."""
+    """Make a lamp's material purely additive: it emits, reflects nothing and blocks no light."""
     tree, shader = material.node_tree, principled(material)
     _set(shader.inputs, BASE_COLOR, (0, 0, 0, 1), SPECULAR_LEVEL, 0.0)
     clear = add_node(tree, "ShaderNodeBsdfTransparent", (1, 1, 1, 1), location=(0, -650))
@@ -109,7 +109,7 @@ def emission_socket(material: bpy.types.Material) -> bpy.types.NodeSocket | None
     """The input that holds the colour of its light, also on a lamp with a black back; None where a picture gives it."""
     socket = principled(material).inputs[EMISSION_COLOR]
     if socket.links and socket.links[0].from_node.type == "MIX":
-        socket = next(one for one in socket.links[0].from_node.inputs if one.type == "RGBA")
+        socket = next(inner for inner in socket.links[0].from_node.inputs if inner.type == "RGBA")
     return None if socket.links else socket
 
 
@@ -139,21 +139,21 @@ def plain_material(
     """A Principled material of plain numbers, linear Rec.709, and at most a picture, which any program understands."""
     material = bpy.data.materials.new(name)
     shader = _fresh_principled(material)
-    value = shader.inputs
-    _set(value, BASE_COLOR, (*colour, 1), ROUGHNESS, roughness, METALLIC, metallic, ALPHA, alpha)
-    _set(value, SPECULAR_LEVEL, specular, IOR, ior)
-    _emit(value, emission)
+    inputs = shader.inputs
+    _set(inputs, BASE_COLOR, (*colour, 1), ROUGHNESS, roughness, METALLIC, metallic, ALPHA, alpha)
+    _set(inputs, SPECULAR_LEVEL, specular, IOR, ior)
+    _emit(inputs, emission)
     if base_color is not None:
-        _show_image(base_color, value[BASE_COLOR])
+        _show_image(base_color, inputs[BASE_COLOR])
     _connect(shader)
     return material
 
 
-def _emit(value, radiance) -> None:
+def _emit(inputs, radiance) -> None:
     """Emit exactly `radiance`: strength is the largest component, so that colours stay within 1."""
     strength = max(*radiance, 0.0)
     colour = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
-    _set(value, EMISSION_COLOR, colour, EMISSION_STRENGTH, strength)
+    _set(inputs, EMISSION_COLOR, colour, EMISSION_STRENGTH, strength)
 
 
 def _front_only(socket) -> None:
@@ -170,9 +170,9 @@ def _show_image(image, socket) -> None:
 
 def texture(tree: bpy.types.NodeTree, image: bpy.types.Image, uv_map: str, **settings) -> bpy.types.NodeSocket:
     """The colour of an image that is laid out by a UV map."""
-    place = add_node(tree, "ShaderNodeUVMap", uv_map=uv_map, location=(-650, 200))
+    uv_node = add_node(tree, "ShaderNodeUVMap", uv_map=uv_map, location=(-650, 200))
     settings |= {"image": image, "extension": "REPEAT" if image.get(REPEATS) else "EXTEND", "location": (-400, 200)}
-    return add_node(tree, "ShaderNodeTexImage", place.outputs[0], **settings).outputs["Color"]
+    return add_node(tree, "ShaderNodeTexImage", uv_node.outputs[0], **settings).outputs["Color"]
 
 
 def _connect(shader: bpy.types.ShaderNode) -> None:
@@ -182,10 +182,10 @@ def _connect(shader: bpy.types.ShaderNode) -> None:
     feed(output.inputs[0], shader.outputs[0])
 
 
-def _set(value, *names_and_values) -> None:
-    """Give inputs values, name and value in turn; None leaves one."""
-    for name, one in zip(names_and_values[::2], names_and_values[1::2], strict=True):
-        feed(value[name], one)
+def _set(inputs, *names_and_values) -> None:
+    """Give inputs values, name and value in turn; None leaves an input as it is."""
+    for name, value in zip(names_and_values[::2], names_and_values[1::2], strict=True):
+        feed(inputs[name], value)
 
 
 def _fresh_principled(material: bpy.types.Material) -> bpy.types.ShaderNode:

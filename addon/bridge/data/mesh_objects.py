@@ -46,24 +46,24 @@ def each_object(
     """
     triangles = by_number(mesh.object_id)
     for instance in instances:
-        own = triangles.get(instance.object_id)
-        if own is None:
+        indices = triangles.get(instance.object_id)
+        if indices is None:
             continue
         # Triangles that repeat a vertex are dropped by no one: they show nothing.
-        used, corners = np.unique(mesh.triangles[own].ravel(), return_inverse=True)
+        used, corners = np.unique(mesh.triangles[indices].ravel(), return_inverse=True)
         vertices = mesh.vertices[used]
-        middle = (vertices.min(0) + vertices.max(0)) / 2
-        data = make_mesh(instance.name, vertices - middle, corners.reshape(-1, 3))
+        centre = (vertices.min(0) + vertices.max(0)) / 2
+        data = make_mesh(instance.name, vertices - centre, corners.reshape(-1, 3))
         for name, uv in ((ATLAS_UV, atlas_uv), (CAPTURE_UV, mesh.uv), (PARTS_UV, parts_uv)):
             if uv is not None:
-                set_layer(data, name, uv[own])
-        shown = data.uv_layers[ATLAS_UV if parts_uv is None else PARTS_UV]
-        data.uv_layers.active, shown.active_render = shown, True
-        thing = bpy.data.objects.new(instance.name, data)
-        thing.location = middle
-        thing[OBJECT_ID] = int(instance.object_id)
-        collection.objects.link(thing)
-        yield instance.object_id, thing
+                set_layer(data, name, uv[indices])
+        layer = data.uv_layers[ATLAS_UV if parts_uv is None else PARTS_UV]
+        data.uv_layers.active, layer.active_render = layer, True
+        obj = bpy.data.objects.new(instance.name, data)
+        obj.location = centre
+        obj[OBJECT_ID] = int(instance.object_id)
+        collection.objects.link(obj)
+        yield instance.object_id, obj
 
 
 def is_open(data: bpy.types.Mesh) -> bool:

@@ -1,4 +1,4 @@
-"""Blender's names: a number such as '.001' tells one from another that would be the same."""
+"""Blender's names: a number such as '.001' keeps equal names apart."""
 
 import re
 

@@ -37,7 +37,7 @@ def mix_node(tree: bpy.types.NodeTree, factor, first, second, **settings) -> bpy
     # By type, as the node has sockets of the same name for each of its data types.
     colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
     for socket, value in zip(
-        (next(one for one in mix.inputs if one.type == "VALUE"), *colours), (factor, first, second)
+        (next(item for item in mix.inputs if item.type == "VALUE"), *colours), (factor, first, second)
     ):
         feed(socket, value)
     return next(socket for socket in mix.outputs if socket.type == "RGBA")
@@ -54,13 +54,13 @@ def image_node(socket: bpy.types.NodeSocket) -> bpy.types.ShaderNode | None:
     return next((node for node in _behind(socket, set()) if node.type == "TEX_IMAGE" and node.image), None)
 
 
-def _behind(socket: bpy.types.NodeSocket, seen: set) -> Iterator[bpy.types.Node]:
+def _behind(socket: bpy.types.NodeSocket, visited: set) -> Iterator[bpy.types.Node]:
     for link in socket.links:
-        if link.from_node not in seen:
-            seen.add(link.from_node)
+        if link.from_node not in visited:
+            visited.add(link.from_node)
             yield link.from_node
             for inner in link.from_node.inputs:
-                yield from _behind(inner, seen)
+                yield from _behind(inner, visited)
 
 
 def make_world(name: str, image: bpy.types.Image | None, strength: float = 1.0) -> bpy.types.World:

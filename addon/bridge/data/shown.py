@@ -7,8 +7,8 @@ import bpy
 
 
 @contextmanager
-def shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """Show `scene` in Blender's window meanwhile, so that operators work on it.
+def in_window(scene: bpy.types.Scene) -> Iterator[None]:
+    """Show `scene` in Blender's window temporarily, so that operators work on it.
 
     The context is not overridden where there is a window in it: of one that is, Blender looks each member up in a dict
     of Python's while an operator has let go of the interpreter's lock, and crashes if another thread runs Python then

@@ -16,7 +16,7 @@ from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
 from .added import scene_apart
 from .arrays import layer_of, make_mesh, set_layer
-from .shown import shown
+from .shown import in_window
 
 _PROJECTION_ANGLE = 1.15
 _EXPECTED_FILL = 0.6
@@ -166,15 +166,15 @@ def _packed(points, corners, uv, size, margin_texels):
         ).reshape(-1, 3, 2)
 
     # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
-    wanted = margin = margin_texels / 2 / size
+    target = margin = margin_texels / 2 / size
     packed, turn = max(
-        ((placed(turn, margin), turn) for turn in ("ANY", "CARDINAL")), key=lambda one: areas(one[0]).sum()
+        ((placed(turn, margin), turn) for turn in ("ANY", "CARDINAL")), key=lambda candidate: areas(candidate[0]).sum()
     )
     for _ in range(2):
         border = packed.min()
-        if border >= 0.97 * wanted or border <= 0:
+        if border >= 0.97 * target or border <= 0:
             break
-        margin *= 1.05 * wanted / border
+        margin *= 1.05 * target / border
         packed = placed(turn, margin)
     return packed
 
@@ -201,14 +201,14 @@ def _laid_out(points, vertex, start, uv, operator, **settings):
     """
     with scene_apart("Scan Relight unwrap") as (scene, _):
         data = make_mesh("Scan Relight unwrap", points, vertex, start)
-        thing = bpy.data.objects.new("Scan Relight unwrap", data)
+        obj = bpy.data.objects.new("Scan Relight unwrap", data)
         set_layer(data, _LAYER, uv)
-        scene.collection.objects.link(thing)
+        scene.collection.objects.link(obj)
         scene.tool_settings.use_uv_select_sync = True
         layer = scene.view_layers[0]
-        layer.objects.active = thing
-        thing.select_set(True, view_layer=layer)
-        with shown(scene):
+        layer.objects.active = obj
+        obj.select_set(True, view_layer=layer)
+        with in_window(scene):
             bpy.ops.object.mode_set(mode="EDIT")
             try:
                 bpy.ops.mesh.select_all(action="SELECT")

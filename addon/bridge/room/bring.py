@@ -13,7 +13,7 @@ import bpy
 from ...core.errors import BadInputError, MissingStageError
 from ...core.io.folder import SCENE
 from ...core.results.room_file import ROOM, root_of, run_of
-from ..data.added import Made
+from ..data.added import AddedData
 from ..data.cameras import show_camera
 from ..marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
 from ..results import changes as room_changes
@@ -24,8 +24,8 @@ from .update import commit, note_known, plan
 
 
 @dataclass(frozen=True)
-class Brought:
-    """What came into the file.
+class ImportedRoom:
+    """A room that was brought into the file.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Brought:
 
 def bringing(
     folder: Path | str, scene: bpy.types.Scene | None = None, where: str = images.RESULT, known: bool = False
-) -> Generator[float, None, Brought]:
+) -> Generator[float, None, ImportedRoom]:
     """Bring a finished result's room into the open file, or update the one that is there; yields the share done.
 
     Nothing that was in the file changes before the last slice: a generator that fails, or is closed before, leaves all
@@ -77,53 +77,53 @@ def bringing(
             "recovery to its end first."
         )
     top = imported(root) if known else find_room(root)
-    made = Made()
+    added = AddedData()
     try:
         yield 0.0
         shell = _append(folder / SCENE)
         yield 0.4
         fresh = next(iter(rooms(shell)), shell.collection.children[0])  # an older one is not marked
         run = run_of(folder)
-        things = list(fresh.all_objects)
-        for owner in (fresh, *things):
+        objects = list(fresh.all_objects)
+        for owner in (fresh, *objects):
             mark(owner, folder, run, root)
-        for done, thing in enumerate(things, 1):  # a scene.blend of an older version has no stamps
-            stamp(thing)
+        for done, obj in enumerate(objects, 1):  # a scene.blend of an older version has no stamps
+            stamp(obj)
             if not done % 16:
-                yield 0.4 + 0.2 * done / len(things)
+                yield 0.4 + 0.2 * done / len(objects)
         if shell.world is not None:
             stamp_tree(shell.world)
-        now = room_changes.found(folder)
+        findings = room_changes.found(folder)
         steps = None
         if top is not None:
             steps = yield from plan(top, fresh)
         yield 0.95
-        images.settle(_images(made, folder), where)
+        images.settle(_images(added, folder), where)
         for name in (images.ALBEDO, images.SHADING):  # shown by nothing yet, but asked for by name
             if (folder / name).exists():
                 images.image(folder, name, where)
     except BaseException:
-        made.remove()
+        added.remove()
         raise
     if top is not None:
-        _replace_images(made, top)
+        _replace_images(added, top)
     warnings: list[str] = []
     if steps is None:
         top, differences = fresh, ()
-        note_known(top, things)
+        note_known(top, objects)
     else:
-        differences = room_changes.compare(room_changes.kept(top), now)
+        differences = room_changes.compare(room_changes.kept(top), findings)
         warnings = commit(steps, top, fresh, shell)
         shell.collection.children.unlink(fresh)
-    room_changes.keep(top, now)
-    place, kept = _place(top, shell, scene, root, steps is None)
-    room_changes.show(place, differences)
-    made.remove_unused(steps.replaced if steps is not None else ())
-    for one, label in steps.names if steps is not None else ():
-        one.name = label
+    room_changes.keep(top, findings)
+    target, messages = _place(top, shell, scene, root, steps is None)
+    room_changes.show(target, differences)
+    added.remove_unused(steps.replaced if steps is not None else ())
+    for datablock, label in steps.names if steps is not None else ():
+        datablock.name = label
     yield 0.98
-    ready(place)
-    return Brought(place, top, (*warnings, *kept))
+    ready(target)
+    return ImportedRoom(target, top, (*warnings, *messages))
 
 
 def ready(scene: bpy.types.Scene) -> None:
@@ -138,50 +138,50 @@ def _append(path: Path) -> bpy.types.Scene:
     if not path.is_file():
         raise MissingStageError(f"Folder '{path.parent}' holds no {path.name}; run the recovery to its end first.")
     try:
-        with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
-            wanted.scenes = there.scenes[:1]
+        with bpy.data.libraries.load(str(path), link=False) as (data_from, data_to):
+            data_to.scenes = data_from.scenes[:1]
     except OSError as error:
         raise BadInputError(
             f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from its last stage."
         ) from error
-    if not wanted.scenes or wanted.scenes[0] is None or not wanted.scenes[0].collection.children:
+    if not data_to.scenes or data_to.scenes[0] is None or not data_to.scenes[0].collection.children:
         raise BadInputError(f"'{path}' holds no room; run the recovery again from its last stage.")
-    return wanted.scenes[0]
+    return data_to.scenes[0]
 
 
-def _images(made: Made, folder: Path) -> list[bpy.types.Image]:
-    found = [image for image in made.new("images") if image.source in ("FILE", "TILED") and image.filepath]
-    for image in found:
+def _images(added: AddedData, folder: Path) -> list[bpy.types.Image]:
+    loaded = [image for image in added.new("images") if image.source in ("FILE", "TILED") and image.filepath]
+    for image in loaded:
         path = Path(image.filepath.replace("\\", "/"))
-        own = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
-        image[IMAGE] = str(folder / path.parent.name / path.name if own else folder / path.name)
-    return found
+        is_part = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
+        image[IMAGE] = str(folder / path.parent.name / path.name if is_part else folder / path.name)
+    return loaded
 
 
-def _replace_images(made: Made, top: bpy.types.Collection) -> None:
-    """Let the images that came stand for those of the same name that the room had from another result folder."""
-    came = {Path(image[IMAGE]).name: image for image in made.new("images") if IMAGE in image}
-    for image in [one for one in bpy.data.images if one.get(IMAGE) and not one.library]:
+def _replace_images(added: AddedData, top: bpy.types.Collection) -> None:
+    """Replace the images that the room had from another result folder by the new ones of the same name."""
+    new = {Path(image[IMAGE]).name: image for image in added.new("images") if IMAGE in image}
+    for image in [existing for existing in bpy.data.images if existing.get(IMAGE) and not existing.library]:
         path = Path(image[IMAGE])
-        if path.name in came and came[path.name] != image and path.is_relative_to(top.get(RESULT, "")):
-            images.replace(image, came[path.name])
+        if path.name in new and new[path.name] != image and path.is_relative_to(top.get(RESULT, "")):
+            images.replace(image, new[path.name])
 
 
 def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, list[str]]:
     """Have the room in `scene`, or in one of its own: the scene to see it in, and what stays as the artist has it."""
-    kept: list[str] = []
-    own = None if new else own_scene(top)
-    if own is not None:
-        kept = take_settings(own, shell)
+    messages: list[str] = []
+    room_scene = None if new else own_scene(top)
+    if room_scene is not None:
+        messages = take_settings(room_scene, shell)
     if scene is not None:
         link_room(top, scene)
-    if scene is None and own is None:
+    if scene is None and room_scene is None:
         link_room(top, shell)
         shell.name, shell[OWN_SCENE] = scene_name(root), True
         dress(shell)
-        return shell, kept
+        return shell, messages
     bpy.data.scenes.remove(shell)
-    return scene or own, kept
+    return scene or room_scene, messages
 
 
 def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.types.Scene | None = None) -> None:

@@ -6,18 +6,18 @@ import bpy
 import numpy as np
 
 from ...core.scene.model import Capture
-from ..data.added import Made
+from ..data.added import AddedData
 from ..data.cameras import make_cameras, make_track, use_camera
 from ..data.mesh_objects import each_object
 from ..marks import CAPTURE, OWN_SCENE
 from ..relight.match_frame import show_picture
 from ..scene.as_made import stamp
 from ..scene.parts import CAMERAS, ROOM, find_room, new_room, part_of, scene_name, scenes_with
-from .bring import Brought, link_room, ready
+from .bring import ImportedRoom, link_room, ready
 from .update import note_known
 
 
-def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generator[float, None, Brought]:
+def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generator[float, None, ImportedRoom]:
     """Bring a capture into the open file in slices of an object or camera each; yields the share done.
 
     A later run finds the room and updates it. Nothing that was in the file changes before the last slice.
@@ -30,35 +30,37 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
     """
     top = find_room(capture.root)
     if top is not None:
-        known = scenes_with(top)[0]
+        existing = scenes_with(top)[0]
         if scene is not None:
             link_room(top, scene)
-        told = f"Capture '{capture.root.name}' is in this file already, in its scene '{known.name}'; it stays as it is."
-        return Brought(scene or known, top, (told,))
-    made = Made()
+        message = (
+            f"Capture '{capture.root.name}' is in this file already, in its scene '{existing.name}'; it stays as it is."
+        )
+        return ImportedRoom(scene or existing, top, (message,))
+    added = AddedData()
     try:
         top = new_room(capture.root)
         total = len(capture.instances) + len(capture.frames)
         blank = np.zeros((len(capture.mesh.triangles), 3, 2), np.float32)
-        names = {one.object_id: one.name for one in capture.instances}
-        things = []
-        for number, thing in each_object(capture.mesh, capture.instances, blank, part_of(top, ROOM)):
-            stamp(thing, names[number])
-            things.append(thing)
-            yield len(things) / total
+        names = {instance.object_id: instance.name for instance in capture.instances}
+        objects = []
+        for number, obj in each_object(capture.mesh, capture.instances, blank, part_of(top, ROOM)):
+            stamp(obj, names[number])
+            objects.append(obj)
+            yield len(objects) / total
         cameras = []
         for index, frame in enumerate(capture.frames):
             cameras += make_cameras([frame], part_of(top, CAMERAS), index)
             show_picture(cameras[-1])
             cameras[-1].data.show_background_images = True
-            yield (len(things) + len(cameras)) / total
+            yield (len(objects) + len(cameras)) / total
         track = make_track(cameras, part_of(top, CAMERAS))
-        for thing in (*things, *cameras, *filter(None, (track,))):
-            thing[CAPTURE] = top[CAPTURE]
-            stamp(thing)
+        for obj in (*objects, *cameras, *filter(None, (track,))):
+            obj[CAPTURE] = top[CAPTURE]
+            stamp(obj)
         note_known(top, top.all_objects)
     except BaseException:
-        made.remove()
+        added.remove()
         raise
     if scene is None:
         scene = bpy.data.scenes.new(scene_name(capture.root))
@@ -68,4 +70,4 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
             use_camera(scene, cameras[0])
     link_room(top, scene)
     ready(scene)
-    return Brought(scene, top)
+    return ImportedRoom(scene, top)

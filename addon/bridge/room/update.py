@@ -21,7 +21,7 @@ from ..scene.as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours
 from ..scene.parts import LAMPS, PART, ROOM, part_of
 
 KNOWN = "scan_relight_known"
-"""Of a room's collection: all things that were brought, as JSON; one that is gone was deleted by the artist."""
+"""Of a room's collection: keys of all objects that were brought in, as JSON; one missing was deleted by the artist."""
 
 
 @dataclass
@@ -49,59 +49,54 @@ class Steps:
     deleted: list[str] = field(default_factory=list)
 
 
-def key_of(thing: bpy.types.Object) -> str:
+def key_of(obj: bpy.types.Object) -> str:
     """What an object of a room is known by."""
-    if OBJECT_ID in thing:
-        return f"object {thing[OBJECT_ID]}"
-    if thing.get(FRAME_INDEX) == NO_FRAME:
+    if OBJECT_ID in obj:
+        return f"object {obj[OBJECT_ID]}"
+    if obj.get(FRAME_INDEX) == NO_FRAME:
         return "track"
-    return f"camera {Path(thing.get('frame_path', '')).name or thing.get(NAME, thing.name)}"
+    return f"camera {Path(obj.get('frame_path', '')).name or obj.get(NAME, obj.name)}"
 
 
-def things_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
+def objects_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
     """A room's objects, wherever the artist has put them, and their duplicates."""
     root = Path(top[CAPTURE]).resolve()
-    same = {
-        name: Path(name).resolve() == root
-        for name in {thing[CAPTURE] for thing in bpy.data.objects if CAPTURE in thing}
-    }
-    within = {thing for thing in top.all_objects if OBJECT_ID in thing or "pixel_aspect" in thing}
+    same = {name: Path(name).resolve() == root for name in {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}}
+    within = {obj for obj in top.all_objects if OBJECT_ID in obj or "pixel_aspect" in obj}
     return [
-        thing
-        for thing in bpy.data.objects
-        if not thing.library
-        and thing.users_collection
-        and (same[thing[CAPTURE]] if CAPTURE in thing else thing in within)
+        obj
+        for obj in bpy.data.objects
+        if not obj.library and obj.users_collection and (same[obj[CAPTURE]] if CAPTURE in obj else obj in within)
     ]
 
 
 def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[float, None, Steps]:
     """Compare the room in the file with a new one; changes nothing, yields the share done (of a whole, 0.6 to 0.95)."""
     steps = Steps()
-    new = {key_of(thing): thing for thing in fresh.all_objects}
+    new = {key_of(obj): obj for obj in fresh.all_objects}
     old: dict[str, list[bpy.types.Object]] = {}
-    came = set(new.values())
-    for thing in things_of(top):
-        if thing not in came:
-            old.setdefault(key_of(thing), []).append(thing)
+    new_objects = set(new.values())
+    for obj in objects_of(top):
+        if obj not in new_objects:
+            old.setdefault(key_of(obj), []).append(obj)
     known = set(json.loads(top.get(KNOWN, "[]")))
-    for done, (key, thing) in enumerate(new.items()):
-        if thing.type == "MESH":
+    for done, (key, obj) in enumerate(new.items()):
+        if obj.type == "MESH":
             yield 0.6 + 0.3 * done / len(new)
-        for one in old.get(key, ()):
-            steps.pairs.append(_compare(one, thing))
+        for existing in old.get(key, ()):
+            steps.pairs.append(_compare(existing, obj))
         if key not in old and key in known:
-            if OBJECT_ID in thing:
-                steps.deleted.append(thing[NAME])
+            if OBJECT_ID in obj:
+                steps.deleted.append(obj[NAME])
         elif key not in old:
-            steps.added.append(thing)
-    for thing in (one for key, some in old.items() if key not in new for one in some):
+            steps.added.append(obj)
+    for obj in (existing for key, objects in old.items() if key not in new for existing in objects):
         yield 0.9
-        hers = thing.type == "MESH" and (is_edited(thing) or any(map(_corrected, thing.material_slots)))
-        if hers or thing.children:
-            steps.kept_removed.append(thing.name)
+        edited = obj.type == "MESH" and (is_edited(obj) or any(map(_corrected, obj.material_slots)))
+        if edited or obj.children:
+            steps.kept_removed.append(obj.name)
         else:
-            steps.removed.append(thing)
+            steps.removed.append(obj)
     return steps
 
 
@@ -122,7 +117,7 @@ def _corrected(slot: bpy.types.MaterialSlot) -> bool:
 
 
 def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection, shell: bpy.types.Scene) -> list[str]:
-    """Do what was planned; sentences on what stays as the artist has it."""
+    """Carry out the plan; returns sentences on what stays as the artist has it."""
     lamps = set(part_of(fresh, LAMPS).objects)
     for name in (RESULT, RUN, CAPTURE):
         top[name] = fresh[name]
@@ -143,26 +138,28 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
         old[NAME] = new[NAME]
         if shell.camera == new:
             shell.camera = old
-    for thing in steps.added:
-        part = next((one for one in thing.users_collection if PART in one), None)
-        (part_of(top, part[PART]) if part is not None else top).objects.link(thing)
-    owned = [one for thing in steps.removed for one in (thing.data, *(slot.material for slot in thing.material_slots))]
-    steps.replaced.extend(one.session_uid for one in owned if one is not None)
+    for obj in steps.added:
+        collection = next((collection for collection in obj.users_collection if PART in collection), None)
+        (part_of(top, collection[PART]) if collection is not None else top).objects.link(obj)
+    owned = [
+        datablock for obj in steps.removed for datablock in (obj.data, *(slot.material for slot in obj.material_slots))
+    ]
+    steps.replaced.extend(datablock.session_uid for datablock in owned if datablock is not None)
     if steps.removed:
         bpy.data.batch_remove(steps.removed)
     note_known(top, fresh.all_objects)
-    again = [sentence for pair in steps.pairs for sentence in corrections.reapply(pair.old)]
-    return _told(steps) + again
+    messages = [sentence for pair in steps.pairs for sentence in corrections.reapply(pair.old)]
+    return _messages(steps) + messages
 
 
-def note_known(top: bpy.types.Collection, things: Iterable[bpy.types.Object]) -> None:
-    """Keep which things were brought into a room."""
-    top[KNOWN] = json.dumps(sorted({*json.loads(top.get(KNOWN, "[]")), *map(key_of, things)}))
+def note_known(top: bpy.types.Collection, objects: Iterable[bpy.types.Object]) -> None:
+    """Remember which objects were brought into a room."""
+    top[KNOWN] = json.dumps(sorted({*json.loads(top.get(KNOWN, "[]")), *map(key_of, objects)}))
 
 
-def _told(steps: Steps) -> list[str]:
+def _messages(steps: Steps) -> list[str]:
     edited, corrected = (
-        [pair.old.name for pair in steps.pairs if getattr(pair, one)] for one in ("edited", "corrected")
+        [pair.old.name for pair in steps.pairs if getattr(pair, flag)] for flag in ("edited", "corrected")
     )
     return list(
         sentences(
@@ -187,7 +184,7 @@ def _place(pair: Pair) -> None:
 def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
     """Give an object the new mesh and material, but for what is the artist's."""
     old, new = pair.old, pair.new
-    slot = next((one for one in old.material_slots if is_ours(one.material)), None)
+    slot = next((candidate for candidate in old.material_slots if is_ours(candidate.material)), None)
     worn = slot.material if slot is not None else None
     material = new.material_slots[0].material if new.material_slots else None
     data = old.data
@@ -204,8 +201,8 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
         fresh = meshes[data]
         if pair.corrected or material is None:
             fresh.materials.clear()
-            for worn_by_it in data.materials:
-                fresh.materials.append(worn_by_it)
+            for old_material in data.materials:
+                fresh.materials.append(old_material)
         elif fresh != new.data or not fresh.materials:
             fresh.materials.clear()
             fresh.materials.append(material)
@@ -219,7 +216,10 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
     if not old.material_slots:
         old.data.materials.append(material)
     else:
-        slot = next((one for one in old.material_slots if one.material in (worn, material)), old.material_slots[0])
+        slot = next(
+            (candidate for candidate in old.material_slots if candidate.material in (worn, material)),
+            old.material_slots[0],
+        )
         slot.material = material
     if worn is not None and worn != material:
         if relight_lamps.is_lamp(worn) and relight_lamps.is_lamp(material):
@@ -228,13 +228,17 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
         steps.names.append((material, worn.name))
 
 
-def _sort(thing: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:
+def _sort(obj: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:
     """Put an object that became a lamp, or is none any more, into the other part, unless the artist moved it."""
-    parts = [one for one in thing.users_collection if one.get(PART) and one in top.children_recursive]
-    wanted = part_of(top, LAMPS if lamp else ROOM)
-    if len(parts) == 1 and parts[0] != wanted and parts[0].get(PART) in (LAMPS, ROOM):
-        parts[0].objects.unlink(thing)
-        wanted.objects.link(thing)
+    parts = [
+        collection
+        for collection in obj.users_collection
+        if collection.get(PART) and collection in top.children_recursive
+    ]
+    target = part_of(top, LAMPS if lamp else ROOM)
+    if len(parts) == 1 and parts[0] != target and parts[0].get(PART) in (LAMPS, ROOM):
+        parts[0].objects.unlink(obj)
+        target.objects.link(obj)
 
 
 def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
@@ -246,7 +250,7 @@ def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
     animated.action_slot = new.animation_data.action_slot
 
 
-def atlas_onto(data: bpy.types.Mesh, place: Matrix, source: bpy.types.Mesh, source_place: Matrix) -> None:
+def atlas_onto(data: bpy.types.Mesh, matrix: Matrix, source: bpy.types.Mesh, source_matrix: Matrix) -> None:
     """Give an edited mesh the atlas coordinates of `source`, each mesh standing at its place.
 
     Where only vertices were moved, those of the same corner. Else each face continues the map of the nearest triangle
@@ -260,22 +264,22 @@ def atlas_onto(data: bpy.types.Mesh, place: Matrix, source: bpy.types.Mesh, sour
         return
     from scipy.spatial import cKDTree  # not earlier: Blender's start should not wait for it
 
-    corners = _corners(source, source_place)
+    corners = _corners(source, source_matrix)
     triangles, maps = corners.reshape(-1, 3, 3), uv.reshape(-1, 3, 2)
     total = read(data.polygons, "loop_total", kind=np.int32)
     face = np.repeat(np.arange(len(total)), total)
-    own = _corners(data, place)
-    middle = np.stack([np.bincount(face, own[:, axis], len(total)) for axis in range(3)], 1) / total[:, None]
+    points = _corners(data, matrix)
+    middle = np.stack([np.bincount(face, points[:, axis], len(total)) for axis in range(3)], 1) / total[:, None]
     nearest = cKDTree(triangles.mean(1)).query(middle)[1][face]
     first = triangles[nearest, 0]
     edges = triangles[nearest, 1:] - first[:, None]
     # Least squares on the triangle's plane; a sliver's pseudo-inverse stays finite.
-    share = np.einsum("ijk,ik->ij", np.linalg.pinv(edges.transpose(0, 2, 1)), own - first)
+    share = np.einsum("ijk,ik->ij", np.linalg.pinv(edges.transpose(0, 2, 1)), points - first)
     steps = maps[nearest, 1:] - maps[nearest, :1]
     new = (maps[nearest, 0] + np.einsum("ij,ijk->ik", share, steps)).clip(0, 1)
     set_layer(data, ATLAS_UV, new).active_render = True
 
 
-def _corners(data: bpy.types.Mesh, place: Matrix) -> np.ndarray:
-    """Where each corner of a mesh is that stands at a place, (c, 3)."""
-    return vertices_of(data, place)[faces_of(data)[1]]
+def _corners(data: bpy.types.Mesh, matrix: Matrix) -> np.ndarray:
+    """World position of each corner of a mesh, (c, 3)."""
+    return vertices_of(data, matrix)[faces_of(data)[1]]

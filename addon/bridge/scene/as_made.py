@@ -1,6 +1,6 @@
-"""What a room was when it was made, kept with its data, so that an artist's edits are told from a run's own values.
+"""The state of a room when it was made, kept with its data, to distinguish an artist's edits from a run's values.
 
-All of it are custom properties: they are saved with the file and need no registered add-on.
+All of it is in custom properties, which are saved with the file and need no registered add-on.
 """
 
 import hashlib
@@ -29,35 +29,35 @@ Blender may add sockets."""
 _BUILT_IN = {"position", "sharp_face", "sharp_edge", "material_index", ATLAS_UV, CAPTURE_UV}
 
 
-def stamp(thing: bpy.types.Object, name: str | None = None) -> None:
-    """Note what an object and its data are; what was noted before stays."""
-    if NAME not in thing:
-        thing[NAME] = name or thing.name
-    if PLACE not in thing:
-        thing[PLACE] = [value for row in thing.matrix_basis for value in row]
-    if thing.type == "MESH":
-        if SHAPE not in thing.data:
-            thing.data[SHAPE] = shape(thing.data)
-        for slot in thing.material_slots:
+def stamp(obj: bpy.types.Object, name: str | None = None) -> None:
+    """Note the state of an object and its data; what was noted before stays."""
+    if NAME not in obj:
+        obj[NAME] = name or obj.name
+    if PLACE not in obj:
+        obj[PLACE] = [value for row in obj.matrix_basis for value in row]
+    if obj.type == "MESH":
+        if SHAPE not in obj.data:
+            obj.data[SHAPE] = shape(obj.data)
+        for slot in obj.material_slots:
             if slot.material is not None:
                 stamp_tree(slot.material)
 
 
 def stamp_tree(owner: bpy.types.Material | bpy.types.World, anew: bool = False) -> None:
-    """Note what a recovered material or world is; `anew` where it was made again in place."""
+    """Note the state of a recovered material or world; `anew` where it was made again in place."""
     if anew or WRITTEN not in owner:
         owner[WRITTEN] = json.dumps(_values(owner))
 
 
-def is_renamed(thing: bpy.types.Object) -> bool:
+def is_renamed(obj: bpy.types.Object) -> bool:
     """Whether the artist gave an object another name."""
-    return split_number(thing.name)[0] != split_number(thing.get(NAME, ""))[0]
+    return split_number(obj.name)[0] != split_number(obj.get(NAME, ""))[0]
 
 
-def made_at(thing: bpy.types.Object) -> Matrix:
+def made_at(obj: bpy.types.Object) -> Matrix:
     """The own matrix that an object was made with."""
-    kept = list(thing[PLACE])
-    return Matrix([kept[k : k + 4] for k in range(0, 16, 4)])
+    values = list(obj[PLACE])
+    return Matrix([values[k : k + 4] for k in range(0, 16, 4)])
 
 
 def shape(data: bpy.types.Mesh) -> str:
@@ -69,29 +69,32 @@ def shape(data: bpy.types.Mesh) -> str:
     return digest.hexdigest()
 
 
-def is_edited(thing: bpy.types.Object) -> bool:
+def is_edited(obj: bpy.types.Object) -> bool:
     """Whether an object has another mesh than the one it was made with, or one with the artist's data on it."""
-    data = thing.data
+    data = obj.data
     added = any(not layer.name.startswith(".") and layer.name not in _BUILT_IN for layer in data.attributes)
     return added or data.shape_keys is not None or len(data.materials) > 1 or data.get(SHAPE) != shape(data)
 
 
 def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:
     """Whether the nodes of a recovered material or world differ from what was written, but for the light's state."""
-    kept = owner.get(WRITTEN)
-    if kept is None:
+    written = owner.get(WRITTEN)
+    if written is None:
         return False
-    now, made = _values(owner), json.loads(kept)
-    nodes = {key.partition("\n")[0] for key in now}
+    current, original = _values(owner), json.loads(written)
+    nodes = {key.partition("\n")[0] for key in current}
     for key in _state(owner):
-        made.pop(key, None)
+        original.pop(key, None)
     # A socket that is gone from a node that is there went with a version of Blender.
-    return any(key.partition("\n")[0] not in nodes or key in now and now[key] != value for key, value in made.items())
+    return any(
+        key.partition("\n")[0] not in nodes or key in current and current[key] != value
+        for key, value in original.items()
+    )
 
 
 @contextmanager
 def our_own(owner: bpy.types.Material | bpy.types.World) -> Iterator[None]:
-    """What is changed within is shown on the artist's behalf: `is_corrected` says afterwards what it said before."""
+    """Changes within are ours, not the artist's: `is_corrected` gives the same afterwards as before."""
     noted = WRITTEN in owner and not is_corrected(owner)
     yield
     if noted:
@@ -116,18 +119,18 @@ def _key(node, socket) -> str:
 
 def _values(owner) -> dict[str, object]:
     """Each input of each node: where its link comes from, else its value; and each node's picture."""
-    found: dict[str, object] = {}
+    values: dict[str, object] = {}
     for node in owner.node_tree.nodes if owner.node_tree else ():
-        found[f"{node.name}\n"] = [node.bl_idname, node.mute]
+        values[f"{node.name}\n"] = [node.bl_idname, node.mute]
         if getattr(node, "image", None) is not None:
-            found[f"{node.name}\nimage"] = bpy.path.basename(node.image.filepath)
+            values[f"{node.name}\nimage"] = bpy.path.basename(node.image.filepath)
         for socket in node.inputs:
             if socket.links:
                 source = socket.links[0]
-                found[_key(node, socket)] = [source.from_node.name, source.from_socket.identifier]
+                values[_key(node, socket)] = [source.from_node.name, source.from_socket.identifier]
             elif socket.type in ("VALUE", "INT", "BOOLEAN", "RGBA", "VECTOR"):
-                found[_key(node, socket)] = _plain(socket.default_value)
-    return found
+                values[_key(node, socket)] = _plain(socket.default_value)
+    return values
 
 
 def _plain(value):
@@ -135,4 +138,4 @@ def _plain(value):
         return value
     if isinstance(value, float):
         return float(f"{value:.6g}")
-    return [float(f"{one:.6g}") for one in value]
+    return [float(f"{x:.6g}") for x in value]

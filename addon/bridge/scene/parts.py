@@ -35,11 +35,11 @@ def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
     for layer in scene.view_layers:
         if layer.layer_collection is None:  # Blender 5: a new scene's layers know nothing before their first update
             layer.update()
-        found = [layer.layer_collection]
-        for one in found:
-            found.extend(one.children)
-            if one.collection == part != top:
-                one.hide_viewport = True
+        layer_collections = [layer.layer_collection]
+        for layer_collection in layer_collections:
+            layer_collections.extend(layer_collection.children)
+            if layer_collection.collection == part != top:
+                layer_collection.hide_viewport = True
 
 
 def scene_name(capture_folder: Path | str) -> str:
@@ -54,15 +54,15 @@ def part_of(top: bpy.types.Collection, name: str) -> bpy.types.Collection:
 
 def rooms(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
     """The collections of the rooms in a scene."""
-    return [one for one in scene.collection.children_recursive if CAPTURE in one]
+    return [collection for collection in scene.collection.children_recursive if CAPTURE in collection]
 
 
 def find_room(capture_folder: Path | str) -> bpy.types.Collection | None:
     """The collection of a capture's room that any scene of this file shows; None without one."""
-    wanted = Path(capture_folder).resolve()
-    for scene in sorted(bpy.data.scenes, key=lambda one: not one.get(OWN_SCENE)):
+    root = Path(capture_folder).resolve()
+    for scene in sorted(bpy.data.scenes, key=lambda candidate: not candidate.get(OWN_SCENE)):
         for top in rooms(scene):
-            if top.library is None and Path(top[CAPTURE]).resolve() == wanted:
+            if top.library is None and Path(top[CAPTURE]).resolve() == root:
                 return top
     return None
 
@@ -77,8 +77,8 @@ def imported(capture_folder: Path | str) -> bpy.types.Collection:
 
 def scenes_with(top: bpy.types.Collection) -> list[bpy.types.Scene]:
     """The scenes that show a room, its own first."""
-    found = [scene for scene in bpy.data.scenes if top in scene.collection.children_recursive]
-    return sorted(found, key=lambda scene: not scene.get(OWN_SCENE))
+    scenes = [scene for scene in bpy.data.scenes if top in scene.collection.children_recursive]
+    return sorted(scenes, key=lambda scene: not scene.get(OWN_SCENE))
 
 
 def own_scene(top: bpy.types.Collection) -> bpy.types.Scene | None:
@@ -104,8 +104,8 @@ def dress(scene: bpy.types.Scene) -> None:
 
 
 def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:
-    """Bring a room's own scene up to date with a new result's; a sentence on each thing that stays the artist's."""
-    kept = []
+    """Update a room's own scene from a new result's; a sentence on each setting that stays the artist's."""
+    messages = []
     if EXPOSURE not in scene:  # the capture was imported, no more
         for name in _RENDER:
             setattr(scene.render, name, getattr(shell.render, name))
@@ -116,24 +116,24 @@ def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:
         scene.world = shell.world
         scene.camera = scene.camera or shell.camera
         dress(scene)
-        return kept
+        return messages
     if abs(scene.view_settings.exposure - scene[EXPOSURE]) < 1e-4:
         scene.view_settings.exposure = shell.view_settings.exposure
         scene[EXPOSURE] = shell.view_settings.exposure
     else:
-        kept.append("The exposure stays as you set it.")
+        messages.append("The exposure stays as you set it.")
     world = outside.recovered_world(scene)
     if world is None or shell.world is None:
         scene.world = scene.world or shell.world
     elif WRITTEN not in world or is_corrected(world):
-        kept.append(f"World '{world.name}' was edited and stays.")
+        messages.append(f"World '{world.name}' was edited and stays.")
     else:
         label, state = world.name, outside.snapshot(world)
         world.user_remap(shell.world)  # wherever it was linked, and where a picture stands in for it
         bpy.data.worlds.remove(world)
         shell.world.name = label
         outside.put_back(shell.world, state)
-    return kept
+    return messages
 
 
 def show(window: bpy.types.Window | None, scene: bpy.types.Scene) -> None:

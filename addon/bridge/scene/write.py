@@ -20,7 +20,7 @@ from ...core.results.room_file import openings_of, run_of
 from ...core.scene.model import Capture
 from ..data.added import scene_apart
 from ..data.arrays import make_mesh
-from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
+from ..data.cameras import best_view, lens_warning, make_cameras, make_track, make_view, size_warning, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import let_light_through, make_material
 from ..data.mesh_objects import each_object, is_open
@@ -67,15 +67,15 @@ def _build(
     for instance in capture.instances:
         if instance.object_id not in objects:
             continue
-        thing = objects[instance.object_id]
+        obj = objects[instance.object_id]
         description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
-        one_sided = description.model.gives_light and is_open(thing.data)
+        one_sided = description.model.gives_light and is_open(obj.data)
         base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
-        thing.data.materials.append(make_material(description, base_color, one_sided=one_sided))
+        obj.data.materials.append(make_material(description, base_color, one_sided=one_sided))
         if description.model.gives_light:
-            room.objects.unlink(thing)
-            lamps.objects.link(thing)
-        stamp(thing, instance.name)
+            room.objects.unlink(obj)
+            lamps.objects.link(obj)
+        stamp(obj, instance.name)
     panels = make_openings(folder, lamps)
     cameras = make_cameras(capture.frames, eyes)
     track = make_track(cameras, eyes)
@@ -86,32 +86,32 @@ def _build(
     scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
     scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
     scene[EXPOSURE] = scene.view_settings.exposure
-    for thing in (*panels, *cameras, *filter(None, (track,))):
-        mark(thing, folder, run, capture.root)
-        stamp(thing)
+    for obj in (*panels, *cameras, *filter(None, (track,))):
+        mark(obj, folder, run, capture.root)
+        stamp(obj)
     hide_cameras(scene, top)
-    warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
+    warnings = tuple(filter(None, (size_warning(capture.frames), lens_warning(capture.frames))))
     return [*images.values(), *dict.fromkeys(own_images.values())], warnings
 
 
 def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """What is bright behind openings, as panels that shine into the room, unseen by cameras; linked to a collection."""
-    made = []
+    panels = []
     for number, (corners, radiance) in enumerate(openings_of(folder), 1):
-        vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-        quads = place.reshape(-1, 4)
+        vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        quads = indices.reshape(-1, 4)
         faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         faces = faces[(np.diff(np.sort(faces, 1), axis=1) > 0).all(1)]
         material = ObjectMaterial(number, "opening", EMITTER, emission=rgb(radiance))
         data = make_mesh(material.name, vertices, faces)
-        thing = bpy.data.objects.new(material.name, data)
-        thing.visible_camera = False
+        obj = bpy.data.objects.new(material.name, data)
+        obj.visible_camera = False
         data.materials.append(make_material(material, one_sided=True))
         # Off, it would shade what closes the mesh behind it.
         let_light_through(data.materials[0])
-        collection.objects.link(thing)
-        made.append(thing)
-    return made
+        collection.objects.link(obj)
+        panels.append(obj)
+    return panels
 
 
 def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:

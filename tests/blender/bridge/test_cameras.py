@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.data.cameras import best_view, differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
+from addon.bridge.data.cameras import best_view, lens_warning, make_cameras, max_pixel_error, size_warning, use_camera  # noqa: E402
 
 POSE = np.array([[0.36, 0.48, -0.8, 1.5], [-0.8, 0.6, 0.0, -0.7], [0.48, 0.64, 0.6, 2.0], [0, 0, 0, 1.0]])
 CAMERAS = {
@@ -67,8 +67,8 @@ def test_names_sizes_and_properties(scene, tmp_path):
 
 def test_differing_sizes_are_told(tmp_path):
     frames = [Frame(n, tmp_path, c) for n, c in CAMERAS.items()]
-    assert differing(frames[:2]) == ""
-    assert "5 different" in differing(frames)
+    assert size_warning(frames[:2]) == ""
+    assert "5 different" in size_warning(frames)
 
 
 LENSES = {
@@ -92,9 +92,9 @@ def through(name):
 @pytest.mark.parametrize("name", LENSES)
 def test_cycles_renders_through_lenses(scene, shoot, tmp_path, name, place):
     camera = through(name)
-    off = off_by(camera)
+    off = max_pixel_error(camera)
     assert off < (0.1 if name != "unified" else 1.5)  # its angle is no polynomial
-    assert bool(unlike([Frame(name, tmp_path, camera)])) == (name == "unified")
+    assert bool(lens_warning([Frame(name, tmp_path, camera)])) == (name == "unified")
     point = POSE[:3, :3] @ np.multiply(place, 3) + POSE[:3, 3]
     pixel, depth = camera.project(point[None])
     if depth[0] < 0 or not ((pixel > 5) & (pixel < (camera.width - 5, camera.height - 5))).all():
@@ -127,15 +127,15 @@ def test_lenses_that_blender_lacks_are_told(scene, tmp_path):
     lens = polynomial("SIMPLE_RADIAL", numerator=(-0.1,))
     camera = Camera(640, 480, 500, 500, 320, 240, POSE, lens)
     # In the corner r^2 = 0.64 and r = 0.8 before distortion as Blender shows it: 0.1 * 0.8^3 * 500.
-    assert off_by(camera) == pytest.approx(25.6, abs=0.01)
-    sentence = unlike([Frame("a", tmp_path, camera), Frame("b", tmp_path, CAMERAS["plain"])])
+    assert max_pixel_error(camera) == pytest.approx(25.6, abs=0.01)
+    sentence = lens_warning([Frame("a", tmp_path, camera), Frame("b", tmp_path, CAMERAS["plain"])])
     assert "SIMPLE_RADIAL" in sentence and "25.6 pixels" in sentence
     thing = make_cameras([Frame("a", tmp_path, camera)], scene.collection)[0]
     assert thing.data.type == "PERSP" and thing.data.lens == pytest.approx(500 * 36 / 640)
-    assert unlike([Frame("b", tmp_path, CAMERAS["plain"])]) == ""
+    assert lens_warning([Frame("b", tmp_path, CAMERAS["plain"])]) == ""
     prism = polynomial("THIN_PRISM_FISHEYE", fisheye=True, tangential=(0.01, 0.0))
     bent = Camera(640, 480, 250, 250, 320, 240, POSE, prism)
-    assert 5 < off_by(bent) < 100 and "THIN_PRISM" in unlike([Frame("c", tmp_path, bent)])
+    assert 5 < max_pixel_error(bent) < 100 and "THIN_PRISM" in lens_warning([Frame("c", tmp_path, bent)])
     assert make_cameras([Frame("c", tmp_path, bent)], scene.collection)[0].data.type == "PANO"
 
 

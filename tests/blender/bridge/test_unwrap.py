@@ -103,7 +103,7 @@ def test_tiny_meshes(scene, faces):
 CROWD = """
 import sys, threading
 import bpy
-from addon.bridge.data.shown import shown
+from addon.bridge.data.shown import in_window
 
 end = threading.Event()
 
@@ -114,7 +114,7 @@ def read():
 threads = [threading.Thread(target=read) for _ in range(2)]
 for one in threads:
     one.start()
-with shown(bpy.data.scenes.new("Other")):
+with in_window(bpy.data.scenes.new("Other")):
     for _ in range(60000):
         bpy.ops.object.select_all(action="SELECT")
 end.set()
