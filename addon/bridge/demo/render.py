@@ -19,7 +19,7 @@ from ..data.materials import BASE_COLOR, plain_material, principled, texture
 from ..data.nodes import add_node, feed, fresh_tree
 from ..refused import whole_folder
 from ..relight.pictures import can_denoise
-from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all_but_frames
+from .room import FIELD_OF_VIEW, Paint, RoomObject, frame_path, room, tour, write_all_but_frames
 
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""
@@ -42,12 +42,12 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):
         return folder
-    things = room()
+    objects = room()
     frames, width, height, samples = SIZES[size]
     poses = tour(frames)
     with whole_folder(folder, f"The demo's capture can't be written to '{folder}'") as part:
-        write_all_but_frames(part, things, poses, (width, height))
-        render_frames(part, things, poses, (width, height), samples, progress)
+        write_all_but_frames(part, objects, poses, (width, height))
+        render_frames(part, objects, poses, (width, height), samples, progress)
         (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
     return folder
 
@@ -61,15 +61,15 @@ def is_rendered(folder: Path, size: str) -> bool:
 
 
 def stamp_of(size: str) -> dict:
-    """What a finished capture is marked with."""
+    """The stamp of a finished capture."""
     return {"format": FORMAT, "size": list(SIZES[size])}
 
 
-def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
+def render_frames(folder: Path, objects, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
     """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
     with scene_apart("demo") as (scene, _):
-        for thing in things:
-            scene.collection.objects.link(build(thing))
+        for obj in objects:
+            scene.collection.objects.link(build(obj))
         shoot = camera_of(scene, size, samples)
         for k, pose in enumerate(poses):
             progress.update(k / len(poses))
@@ -113,35 +113,35 @@ def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
     cycles.use_denoising = can_denoise()
 
 
-def build(thing: Thing):
-    """The thing as a mesh object with its true materials."""
-    vertices, faces, uv, slot = thing.faces()
-    mesh = bpy.data.meshes.new(thing.class_name)
+def build(obj: RoomObject):
+    """A mesh object with its true materials."""
+    vertices, faces, uv, slot = obj.faces()
+    mesh = bpy.data.meshes.new(obj.class_name)
     mesh.from_pydata(vertices.tolist(), [], faces.tolist())
     set_layer(mesh, "uv", uv)
     mesh.polygons.foreach_set("material_index", slot.astype(np.int32))
-    for paint in thing.paints:
-        mesh.materials.append(material(thing.class_name, paint))
-    return bpy.data.objects.new(thing.class_name, mesh)
+    for paint in obj.paints:
+        mesh.materials.append(material(obj.class_name, paint))
+    return bpy.data.objects.new(obj.class_name, mesh)
 
 
 def material(name: str, paint: Paint):
     """The paint as a Cycles material: emission, or a Principled."""
     if not paint.emission:
         plain = paint.albedo.ndim == 1
-        made = plain_material(
+        result = plain_material(
             name,
             tuple(paint.albedo.tolist()) if plain else (0.5, 0.5, 0.5),
             paint.roughness,
             0.5 if paint.f0 else 0.0,
             ior=ior_of(paint.f0) if paint.f0 else 1.5,
         )
-        principled(made).distribution = "GGX"
+        principled(result).distribution = "GGX"
         if not plain:
             picture = array_image(name, paint.albedo)
-            feed(principled(made).inputs[BASE_COLOR], texture(made.node_tree, picture, "uv"))
-        return made
-    made = bpy.data.materials.new(name)
-    tree = fresh_tree(made)
+            feed(principled(result).inputs[BASE_COLOR], texture(result.node_tree, picture, "uv"))
+        return result
+    result = bpy.data.materials.new(name)
+    tree = fresh_tree(result)
     add_node(tree, "ShaderNodeOutputMaterial", add_node(tree, "ShaderNodeEmission", (*paint.emission, 1)).outputs[0])
-    return made
+    return result

@@ -1,5 +1,5 @@
 """The demo's room as plain values: shapes, colours, gloss and lamps that the demo knows and the method does not; and on
-disk, as a capture but for its pictures.
+disk, as a capture without its pictures.
 
 Everything is made of quads; metres, +Z up. `demo.render` turns it into a scene for Cycles and into a capture.
 """
@@ -40,7 +40,7 @@ class Paint:
 
 
 @dataclass(frozen=True)
-class Thing:
+class RoomObject:
     """One object of the room.
 
     Attributes
@@ -90,13 +90,13 @@ class Thing:
         """Base colours where paint `slot` ((m,) int) has the coordinates `uv` ((m, ..., 2)), (m, ..., 3) float64."""
         result = np.empty((*uv.shape[:-1], 3))
         for k, paint in enumerate(self.paints):
-            mine = slot == k
+            mask = slot == k
             if paint.albedo.ndim == 1:
-                result[mine] = paint.albedo
+                result[mask] = paint.albedo
             else:
                 size = np.array(paint.albedo.shape[1::-1])
-                x, y = np.moveaxis(np.clip((uv[mine] * size).astype(int), 0, size - 1), -1, 0)
-                result[mine] = paint.albedo[y, x]
+                x, y = np.moveaxis(np.clip((uv[mask] * size).astype(int), 0, size - 1), -1, 0)
+                result[mask] = paint.albedo[y, x]
         return result
 
     def normals(self) -> np.ndarray:
@@ -199,16 +199,16 @@ def stripes(size=128) -> np.ndarray:
     return colours[(x * 16).astype(int) % 4].astype(np.float32)
 
 
-def room() -> tuple[Thing, ...]:
+def room() -> tuple[RoomObject, ...]:
     """The furnished room."""
     x, y, z = SIZE
-    things: list[Thing] = []
+    objects: list[RoomObject] = []
 
     def add(class_name, shapes, *paints, slots=None, triangles=False):
         slots = slots or [0] * len(shapes)
         quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
         slot = np.repeat(slots, [len(s[0]) for s in shapes])
-        things.append(Thing(len(things), class_name, quads, uv, slot, paints, triangles))
+        objects.append(RoomObject(len(objects), class_name, quads, uv, slot, paints, triangles))
 
     def plain(*colour, **gloss):
         return Paint(np.array(colour, np.float32), **gloss)
@@ -227,9 +227,9 @@ def room() -> tuple[Thing, ...]:
         ],
         plain(0.70, 0.64, 0.54),
     )
-    things[-1] = facing(things[-1], np.array([x / 2, y / 2, z / 2]))
+    objects[-1] = facing(objects[-1], np.array([x / 2, y / 2, z / 2]))
     add("papered wall", [grid((x, y, 0), (-x, 0, 0), (0, 0, z), 16, 10)], Paint(wallpaper()))
-    things[-1] = facing(things[-1], np.array([x / 2, y / 2, z / 2]))
+    objects[-1] = facing(objects[-1], np.array([x / 2, y / 2, z / 2]))
     add("ceiling lamp", [box((1.85, 1.45, z - 0.06), (2.55, 2.15, z - 0.01))], lamp(20.0, 18.5, 16.5))
     add(
         "sofa",
@@ -250,7 +250,7 @@ def room() -> tuple[Thing, ...]:
     add("ball", [ball((3.35, 1.05, 0.32), 0.32, 16)], plain(0.02, 0.07, 0.05, roughness=0.3, f0=0.04), triangles=True)
     add("cabinet", [box((0.02, 1.0, 0.02), (0.47, 2.3, 0.8))], plain(0.30, 0.03, 0.02, roughness=0.45, f0=0.06))
     add("painting", [box((0.01, 1.15, 1.15), (0.04, 2.15, 1.95))], plain(0.04, 0.03, 0.03), Paint(painting()))
-    things[-1].slot[2] = 1
+    objects[-1].slot[2] = 1
     add("lamp shade", [cone((3.95, 3.15, 1.25), 0.24, 0.15, 0.32, 24)], lamp(11.0, 7.2, 3.8))
     add(
         "lamp stand",
@@ -282,15 +282,15 @@ def room() -> tuple[Thing, ...]:
     colours = [plain(*c) for c in ((0.45, 0.09, 0.06), (0.08, 0.20, 0.38), (0.60, 0.52, 0.36), (0.09, 0.25, 0.10))]
     slots = [0] * len(frame) + [int(k) for k in books.integers(1, 5, len(shelves))]
     add("bookshelf", frame + shelves, plain(0.55, 0.52, 0.48), *colours, slots=slots)
-    return tuple(things)
+    return tuple(objects)
 
 
-def facing(thing: Thing, point: np.ndarray) -> Thing:
-    """The same thing with every quad's front towards `point`."""
-    normal = np.cross(thing.quads[:, 1] - thing.quads[:, 0], thing.quads[:, 3] - thing.quads[:, 0])
-    away = np.einsum("qk,qk->q", normal, point - thing.quads[:, 0]) < 0
-    thing.quads[away], thing.uv[away] = thing.quads[away, ::-1], thing.uv[away, ::-1]
-    return thing
+def facing(obj: RoomObject, point: np.ndarray) -> RoomObject:
+    """The same object with every quad's front towards `point`."""
+    normal = np.cross(obj.quads[:, 1] - obj.quads[:, 0], obj.quads[:, 3] - obj.quads[:, 0])
+    away = np.einsum("qk,qk->q", normal, point - obj.quads[:, 0]) < 0
+    obj.quads[away], obj.uv[away] = obj.quads[away, ::-1], obj.uv[away, ::-1]
+    return obj
 
 
 def tour(frames: int) -> np.ndarray:
@@ -322,7 +322,9 @@ def frame_path(index: int) -> str:
     return f"images/frame_{index:04d}.exr"
 
 
-def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndarray, size: tuple[int, int]) -> None:
+def write_all_but_frames(
+    folder: Path, objects: tuple[RoomObject, ...], poses: np.ndarray, size: tuple[int, int]
+) -> None:
     """Make `folder` a capture without its pictures.
 
     Parameters
@@ -334,10 +336,10 @@ def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndar
     """
     (folder / "images").mkdir(parents=True)
     (folder / "truth").mkdir()
-    write_mesh(folder / "mesh.ply", things)
-    objects = [{"id": thing.object_id, "class_name": thing.class_name} for thing in things]
-    (folder / "info_semantic.json").write_text(json.dumps({"objects": objects}, indent=1))
-    (folder / "truth" / "materials.json").write_text(json.dumps([truth(thing) for thing in things], indent=1))
+    write_mesh(folder / "mesh.ply", objects)
+    entries = [{"id": obj.object_id, "class_name": obj.class_name} for obj in objects]
+    (folder / "info_semantic.json").write_text(json.dumps({"objects": entries}, indent=1))
+    (folder / "truth" / "materials.json").write_text(json.dumps([truth(obj) for obj in objects], indent=1))
     width, height = size
     focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
     transforms = {
@@ -353,27 +355,27 @@ def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndar
     (folder / "transforms.json").write_text(json.dumps(transforms, indent=1))
 
 
-def truth(thing: Thing) -> dict:
-    """What the room's maker knows of `thing`, for the comparison at the demo's end."""
-    paint = thing.paints[0]
+def truth(obj: RoomObject) -> dict:
+    """The true values of `obj`, for the comparison at the demo's end."""
+    paint = obj.paints[0]
     return {
-        "id": thing.object_id,
-        "class_name": thing.class_name,
+        "id": obj.object_id,
+        "class_name": obj.class_name,
         "emission": paint.emission,
         "alpha": paint.roughness**2 if paint.f0 else None,
         "f0": paint.f0,
         "metallic": 0.0,
-        "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
+        "base_color": [round(float(c), 4) for c in obj.mean_albedo()],
     }
 
 
-def write_mesh(path: Path, things: tuple[Thing, ...]) -> None:
-    """All things as one binary PLY with an `object_id` on each face."""
+def write_mesh(path: Path, objects: tuple[RoomObject, ...]) -> None:
+    """All objects as one binary PLY with an `object_id` on each face."""
     corners, faces, first = [], [], 0
-    for thing in things:
-        vertices, index, _, _ = thing.faces()
+    for obj in objects:
+        vertices, index, _, _ = obj.faces()
         corners.append(vertices.astype(np.float32))
-        faces.append((index + first, thing.object_id))
+        faces.append((index + first, obj.object_id))
         first += len(vertices)
-    faces.sort(key=lambda one: one[0].shape[1])  # triangles, then quads
+    faces.sort(key=lambda item: item[0].shape[1])  # triangles, then quads
     path.write_bytes(ply_bytes(np.concatenate(corners), faces))

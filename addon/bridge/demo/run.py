@@ -54,7 +54,7 @@ def run_demo(
         The table of recovered against true values; OUT/comparison.txt holds it too.
     """
     out = Path(out)
-    Store(out).close()  # a folder that can't be written is told now, not after the rendering
+    Store(out).close()  # a folder that can't be written is reported now, not after the rendering
     progress = Progress(listener, should_stop, {"render": 60, **WEIGHTS, "pictures": 30})
     capture = out / "capture"
     stored = is_rendered(capture, size)
@@ -90,11 +90,11 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     for lamp in find_lamps(scene):
         set_on(lamp, False)
     outside.set_on(scene.world, False)
-    for place, target, tint, power in LIGHTS:
+    for location, target, tint, power in LIGHTS:
         light = bpy.data.lights.new("Demo light", "AREA")
         light.color, light.energy, light.size = tint, power, 0.5
-        thing = bpy.data.objects.new("Demo light", light)
-        thing.matrix_world = Matrix(look_at(place, target).tolist())
-        scene.collection.objects.link(thing)
+        obj = bpy.data.objects.new("Demo light", light)
+        obj.matrix_world = Matrix(look_at(location, target).tolist())
+        scene.collection.objects.link(obj)
     shoot(scene, out / "relit.png")
     beside(out / "before.png", out / "relit.png", out / "before_after.png")

@@ -12,27 +12,27 @@ from ..marks import RESULT
 TAG = "Scan Relight"
 
 
-def worn(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Material, str]:
+def worn(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Material, str]:
     """The recovered materials that objects wear, each with the name of the capture that it comes from."""
-    found: dict[bpy.types.Material, str] = {}
-    for thing in things:
-        result = thing.get(RESULT)
-        for slot in thing.material_slots:
+    materials: dict[bpy.types.Material, str] = {}
+    for obj in objects:
+        result = obj.get(RESULT)
+        for slot in obj.material_slots:
             if slot.material is not None and MODEL in slot.material and not slot.material.library:
-                found.setdefault(slot.material, capture_name(Path(result)) if result else "")
-    return found
+                materials.setdefault(slot.material, capture_name(Path(result)) if result else "")
+    return materials
 
 
-def mark(things: Iterable[bpy.types.Object], previews: bool = False) -> int:
-    """Mark what objects wear as assets; returns how many materials that are.
+def mark(objects: Iterable[bpy.types.Object], previews: bool = False) -> int:
+    """Mark the materials that objects wear as assets; returns how many.
 
     Parameters
     ----------
     previews : bool
         Have Blender render previews, beside the window; it renders none in the background.
     """
-    found = worn(things)
-    for material, capture in found.items():
+    materials = worn(objects)
+    for material, capture in materials.items():
         material.asset_mark()
         data = material.asset_data
         data.author = TAG
@@ -42,12 +42,12 @@ def mark(things: Iterable[bpy.types.Object], previews: bool = False) -> int:
             data.tags.new(tag, skip_if_exists=True)
         if previews:
             material.asset_generate_preview()
-    return len(found)
+    return len(materials)
 
 
-def clear(things: Iterable[bpy.types.Object]) -> int:
-    """Take what objects wear out of the assets; returns how many materials were one."""
-    found = [material for material in worn(things) if material.asset_data is not None]
-    for material in found:
+def clear(objects: Iterable[bpy.types.Object]) -> int:
+    """Clear the asset mark of the materials that objects wear; returns how many had one."""
+    assets = [material for material in worn(objects) if material.asset_data is not None]
+    for material in assets:
         material.asset_clear()
-    return len(found)
+    return len(assets)

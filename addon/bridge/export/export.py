@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import BadInputError
-from ..data.added import Made
+from ..data.added import AddedData
 from ..data.arrays import faces_of, layer_of
 from ..data.materials import MODEL, opacity
 from ..data.mesh_objects import PARTS_UV
@@ -24,7 +24,7 @@ FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD
 """By ending."""
 ROOM, SELECTED, ALL = "ROOM", "SELECTED", "ALL"
 _BESIDE = (".usdc", ".usd", ".usda")
-"""Files whose textures we lay beside them ourselves."""
+"""Formats whose textures we write beside the file ourselves."""
 _COLLECTION = "Scan Relight export"
 
 
@@ -70,116 +70,116 @@ def export(
     problem = can_export(ending)
     if problem:
         raise BadInputError(problem)
-    things = chosen(scene, scope)
-    if not things:
+    objects = chosen(scene, scope)
+    if not objects:
         raise BadInputError("There is nothing to export: no visible mesh among what was chosen.")
     extra = [
-        thing
-        for thing in scene.objects
-        if not thing.hide_render and (lights and thing.type == "LIGHT" or cameras and thing == scene.camera)
+        obj
+        for obj in scene.objects
+        if not obj.hide_render and (lights and obj.type == "LIGHT" or cameras and obj == scene.camera)
     ]
     with tempfile.TemporaryDirectory(prefix="scan_relight_", ignore_cleanup_errors=True) as folder:
-        made = Path(folder, "made")
-        made.mkdir()
+        staging = Path(folder, "made")
+        staging.mkdir()
         # Blender's USD exporter can be told no folder for its textures, but it can leave them where they are.
-        textures = made / textures_of(path) if ending in _BESIDE else Path(folder, "textures")
-        with copies(scene, things, extra, textures, FORMATS[ending] != "USD") as collection:
+        textures = staging / textures_of(path) if ending in _BESIDE else Path(folder, "textures")
+        with copies(scene, objects, extra, textures, FORMATS[ending] != "USD") as collection:
             with refused(f"'{path}' can't be exported", "choose another format, or fewer objects"):
-                _write(made / path.name, ending, collection)
+                _write(staging / path.name, ending, collection)
         with refused(f"'{path}' can't be written", "free some space or choose another folder"):
-            put(made, path)
-    return remarks(ending, things, extra, scene)
+            put(staging, path)
+    return remarks(ending, objects, extra, scene)
 
 
 def chosen(scene: bpy.types.Scene, scope: str) -> list[bpy.types.Object]:
-    """The meshes that a scope means; none that is hidden from renders."""
-    meshes = [thing for thing in scene.objects if thing.type == "MESH" and not thing.hide_render]
+    """The meshes in a scope, except those hidden from renders."""
+    meshes = [obj for obj in scene.objects if obj.type == "MESH" and not obj.hide_render]
     if scope == SELECTED:
-        return [thing for thing in meshes if thing.select_get()]
+        return [obj for obj in meshes if obj.select_get()]
     if scope == ROOM:
-        return [thing for thing in meshes if OBJECT_ID in thing or "scan_relight_virtual" in thing]
+        return [obj for obj in meshes if OBJECT_ID in obj or "scan_relight_virtual" in obj]
     return meshes
 
 
 def remarks(
-    ending: str, things: Iterable[bpy.types.Object], lamps: Iterable[bpy.types.Object], scene: bpy.types.Scene
+    ending: str, objects: Iterable[bpy.types.Object], lamps: Iterable[bpy.types.Object], scene: bpy.types.Scene
 ) -> list[str]:
-    """What a format loses of these, one sentence each."""
-    told = []
+    """What a format can't hold of these objects, one sentence each."""
+    messages = []
     if FORMATS[ending] == "USD":
-        told.append(
+        messages.append(
             "USD's preview surface has no one-sided emission and Blender writes no Specular IOR Level to it: "
             "objects without highlight get an index of refraction of 1 instead."
         )
-        if any(opacity(slot.material) < 0.99 for thing in things for slot in thing.material_slots if slot.material):
-            told.append("Blender 5.2 writes no Alpha to USD, so glass may be opaque there; glTF keeps it.")
+        if any(opacity(slot.material) < 0.99 for obj in objects for slot in obj.material_slots if slot.material):
+            messages.append("Blender 5.2 writes no Alpha to USD, so glass may be opaque there; glTF keeps it.")
     else:
         if any(lamp.type == "LIGHT" and lamp.data.type == "AREA" for lamp in lamps):
-            told.append("glTF has no area lights, so they are left out.")
+            messages.append("glTF has no area lights, so they are left out.")
         if scene.world is not None and scene.world.node_tree:
-            told.append(
+            messages.append(
                 "glTF holds no light from outside, and few viewers light a room by its glowing lamps: add the "
                 "light there."
             )
-    return told
+    return messages
 
 
 @contextmanager
 def copies(
     scene: bpy.types.Scene,
-    things: Iterable[bpy.types.Object],
+    objects: Iterable[bpy.types.Object],
     extra: Iterable[bpy.types.Object],
     textures: Path,
     level: bool = True,
 ) -> Iterator[bpy.types.Collection]:
-    """A collection of copies with plain materials, their 8-bit pictures in `textures`; no trace is left afterwards."""
-    world, names, made = scene.world, Names(), Made()
+    """A temporary collection of copies with plain materials, their 8-bit pictures in `textures`."""
+    world, names, added = scene.world, Names(), AddedData()
     try:
         textures.mkdir(parents=True)
         collection = bpy.data.collections.new(_COLLECTION)
         scene.collection.children.link(collection)
         pictures: dict = {}
         plain: dict = {}
-        things, extra = list(things), list(extra)
-        for thing, name in zip(things + extra, unique(own_name(thing) for thing in things + extra)):
-            copy = thing.copy()
+        objects, extra = list(objects), list(extra)
+        for obj, name in zip(objects + extra, unique(own_name(obj) for obj in objects + extra)):
+            copy = obj.copy()
             names.give("objects", copy, name)
             collection.objects.link(copy)
             copy.parent = None
-            copy.matrix_world = thing.matrix_world
-            if thing not in things:
+            copy.matrix_world = obj.matrix_world
+            if obj not in objects:
                 continue
             copy.hide_viewport = False
-            for own, slot in zip(thing.material_slots, copy.material_slots):
-                if own.material is None:
+            for old_slot, slot in zip(obj.material_slots, copy.material_slots):
+                if old_slot.material is None:
                     continue
-                if own.material not in plain:
-                    plain[own.material] = plain_copy(own.material, textures, pictures, level, _tiles(thing))
+                if old_slot.material not in plain:
+                    plain[old_slot.material] = plain_copy(old_slot.material, textures, pictures, level, _tiles(obj))
                 slot.link = "OBJECT"
-                slot.material = plain[own.material]
-        for own, name in zip(plain, unique(map(own_name, plain))):
-            names.give("materials", plain[own], name)
+                slot.material = plain[old_slot.material]
+        for material, name in zip(plain, unique(map(own_name, plain))):
+            names.give("materials", plain[material], name)
         # By their first objects: one mesh may be worn by several.
         meshes = {copy.data: copy for copy in reversed(collection.objects) if copy.type == "MESH"}
-        wanted = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
-        for mesh, name in zip(meshes, unique(wanted)):
+        mesh_names = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
+        for mesh, name in zip(meshes, unique(mesh_names)):
             names.give("meshes", mesh, name)
         if not level and world is not None and world.node_tree:
             scene.world = _with_own_pictures(world, textures)
         yield collection
     finally:
         scene.world = world
-        made.remove()
+        added.remove()
         names.put_back()
 
 
-def _tiles(thing: bpy.types.Object) -> frozenset[int]:
+def _tiles(obj: bpy.types.Object) -> frozenset[int]:
     """The UDIM tiles that an object's faces lie on; none where it has no coordinates for tiles."""
-    layer = thing.data.uv_layers.get(PARTS_UV)
+    layer = obj.data.uv_layers.get(PARTS_UV)
     if layer is None or not len(layer.uv):
         return frozenset()
     # By the middles of faces: a corner may lie on an edge.
-    starts, uv = faces_of(thing.data)[0], layer_of(thing.data, PARTS_UV)
+    starts, uv = faces_of(obj.data)[0], layer_of(obj.data, PARTS_UV)
     middle = np.add.reduceat(uv, starts[:-1]) / np.diff(starts)[:, None]
     column, row = np.floor(middle).astype(int).T
     return frozenset((1001 + column + 10 * row).tolist())
@@ -240,25 +240,27 @@ def textures_of(path: Path) -> str:
     return f"{path.name} textures"
 
 
-def put(made: Path, path: Path) -> None:
-    """Bring what was written into the folder `made` to its place beside `path`, `path` itself last.
+def put(staging: Path, path: Path) -> None:
+    """Move what was written into the folder `staging` to its place beside `path`, `path` itself last.
 
     An earlier export of that file is replaced with its textures, nothing else is touched; all is back where it fails
     (`OSError`).
     """
-    if not (made / path.name).is_file() or not (made / path.name).stat().st_size:
+    if not (staging / path.name).is_file() or not (staging / path.name).stat().st_size:
         raise OSError(0, "Blender's exporter wrote nothing")
     path.parent.mkdir(parents=True, exist_ok=True)
-    names = sorted({one.name for one in made.iterdir()} | {textures_of(path)}, key=lambda name: name == path.name)
+    names = sorted(
+        {entry.name for entry in staging.iterdir()} | {textures_of(path)}, key=lambda name: name == path.name
+    )
     partial, before = ({name: path.parent / f".{kind}-{name}" for name in names} for kind in ("partial", "before"))
     done = []
     try:
         for name in names:
             _remove(partial[name], before[name])
-            if (made / name).is_dir() and any((made / name).iterdir()):
-                shutil.copytree(made / name, partial[name])
-            elif (made / name).is_file():
-                shutil.copyfile(made / name, partial[name])
+            if (staging / name).is_dir() and any((staging / name).iterdir()):
+                shutil.copytree(staging / name, partial[name])
+            elif (staging / name).is_file():
+                shutil.copyfile(staging / name, partial[name])
         for name in names:
             if (path.parent / name).exists():
                 (path.parent / name).replace(before[name])
@@ -294,32 +296,32 @@ def identifier(name: str) -> str:
     return f"_{legal}" if legal[:1].isdigit() else legal
 
 
-def own_name(thing: bpy.types.ID) -> str:
+def own_name(datablock: bpy.types.ID) -> str:
     """An object's or material's name; of a recovered one without the '.001' that Blender adds to the second room's."""
-    return split_number(thing.name)[0] if OBJECT_ID in thing or MODEL in thing else thing.name
+    return split_number(datablock.name)[0] if OBJECT_ID in datablock or MODEL in datablock else datablock.name
 
 
 def unique(names: Iterable[str]) -> list[str]:
     """The names, those after the first of their kind with a number: no two are one in USD, nor on any file system."""
     taken, result = set(), []
     for name in names:
-        found, number = name, 1
-        while identifier(found).casefold() in taken:
+        candidate, number = name, 1
+        while identifier(candidate).casefold() in taken:
             number += 1
-            found = f"{name} ({number})"
-        taken.add(identifier(found).casefold())
-        result.append(found)
+            candidate = f"{name} ({number})"
+        taken.add(identifier(candidate).casefold())
+        result.append(candidate)
     return result
 
 
 class Names:
-    """Who bears which name for the moment, and the way back."""
+    """Temporary names of datablocks, and the names to restore."""
 
     def __init__(self) -> None:
         self._before: list[tuple[bpy.types.ID, str]] = []
 
     def give(self, kind: str, item: bpy.types.ID, name: str) -> None:
-        """Let `item` of ``bpy.data``'s collection `kind` be called `name`; nothing happens to linked data."""
+        """Rename `item` of ``bpy.data``'s collection `kind` to `name`; linked data keep theirs."""
         if item.library or item.name == name:
             return
         known = getattr(bpy.data, kind)
@@ -333,7 +335,7 @@ class Names:
         item.name = name
 
     def put_back(self) -> None:
-        """Everything is called what it was; copies have to be gone."""
+        """Restore all names; the copies have to be removed before."""
         for item, name in reversed(self._before):
             try:
                 item.name = name

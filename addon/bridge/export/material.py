@@ -64,28 +64,28 @@ def plain_copy(
     shader = principled(material)
     if shader is None:
         return plain_material(material.name)
-    value = shader.inputs
-    node = image_node(value[BASE_COLOR])
+    inputs = shader.inputs
+    node = image_node(inputs[BASE_COLOR])
     image = node.image if node else None
-    ior, specular = value[IOR].default_value, value[SPECULAR_LEVEL].default_value
+    ior, specular = inputs[IOR].default_value, inputs[SPECULAR_LEVEL].default_value
     if not level:
         ior, specular = ior_of(2 * specular * ((ior - 1) / (ior + 1)) ** 2), 0.5
     elif specular == 0.5:
         # Blender's glTF exporter writes an index of refraction only beside a specular factor that is not 1.
         specular = 0.49999
-    made = plain_material(
+    copy = plain_material(
         material.name,
-        tuple(value[BASE_COLOR].default_value[:3]),
-        value[ROUGHNESS].default_value,
+        tuple(inputs[BASE_COLOR].default_value[:3]),
+        inputs[ROUGHNESS].default_value,
         specular,
-        value[METALLIC].default_value,
+        inputs[METALLIC].default_value,
         ior,
         emission(material),
         None if image is None else _picture(*_one_tile(image, tiles), textures, pictures),
-        value[ALPHA].default_value,
+        inputs[ALPHA].default_value,
     )
-    made.use_backface_culling = bool(value[EMISSION_COLOR].links) and lamps.is_lamp(material)
-    return made
+    copy.use_backface_culling = bool(inputs[EMISSION_COLOR].links) and lamps.is_lamp(material)
+    return copy
 
 
 def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:
@@ -97,11 +97,14 @@ def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.
     folder = Path(bpy.path.abspath(image.filepath)).parent
     whole = next(
         (
-            one
-            for one in bpy.data.images
-            if one.source == "FILE"
-            and UV_MAP not in one
-            and (one.get(IMAGE) == str(folder / WHOLE) or Path(bpy.path.abspath(one.filepath)) == folder / WHOLE)
+            candidate
+            for candidate in bpy.data.images
+            if candidate.source == "FILE"
+            and UV_MAP not in candidate
+            and (
+                candidate.get(IMAGE) == str(folder / WHOLE)
+                or Path(bpy.path.abspath(candidate.filepath)) == folder / WHOLE
+            )
         ),
         None,
     )
@@ -113,15 +116,15 @@ def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
     if not tile:
         return image_array(image)
     path = Path(bpy.path.abspath(image.filepath.replace(UDIM, str(tile))))
-    packed = next((one for one in image.packed_files if str(tile) in Path(one.filepath).name), None)
+    packed = next((file for file in image.packed_files if str(tile) in Path(file.filepath).name), None)
     if packed is not None:
         path = textures.with_name(f"tile{path.suffix}")
         path.write_bytes(packed.packed_file.data)
-    one = load_image(path, colour_space=image.colorspace_settings.name, keep=False)
+    tile_image = load_image(path, colour_space=image.colorspace_settings.name, keep=False)
     try:
-        return image_array(one)
+        return image_array(tile_image)
     finally:
-        bpy.data.images.remove(one)
+        bpy.data.images.remove(tile_image)
         if packed is not None:
             path.unlink()
 
@@ -147,10 +150,10 @@ def _picture(image: bpy.types.Image, tile: int, textures: Path, pictures: dict) 
     linear = image.colorspace_settings.name != "sRGB" or image.is_float
     path = textures / f"{_file_name(image, textures)}{f'_{tile}' if tile else ''}.png"
     write_png(path, np.ascontiguousarray(encoded(pixels) if linear else (pixels * 255 + 0.5).astype(np.uint8)))
-    made = bpy.data.images.load(str(path))
-    made.colorspace_settings.name = "sRGB"
+    picture = bpy.data.images.load(str(path))
+    picture.colorspace_settings.name = "sRGB"
     if UV_MAP in image:
-        made[UV_MAP] = image[UV_MAP]
-    made[REPEATS] = bool(tile)
-    pictures[image, tile] = made
-    return made
+        picture[UV_MAP] = image[UV_MAP]
+    picture[REPEATS] = bool(tile)
+    pictures[image, tile] = picture
+    return picture

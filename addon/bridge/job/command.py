@@ -30,7 +30,7 @@ def command(arguments: Sequence[str], **options: object) -> list[str]:
     In Blender it is Blender itself, without a window and with factory settings, so that no preference, startup file or
     other add-on has a say; packages are looked for where this process finds them. It has a lower priority.
     """
-    arguments = [str(one) for one in arguments]
+    arguments = [str(argument) for argument in arguments]
     for name, value in options.items():
         option = name.replace("_", "-")
         if isinstance(value, bool):
@@ -38,10 +38,10 @@ def command(arguments: Sequence[str], **options: object) -> list[str]:
         elif value is not None:
             arguments += [f"--{option}", str(value)]
     scripts = bpy.utils.system_resource("SCRIPTS")  # the child's Blender puts them in place itself
-    path = [one for one in sys.path if isinstance(one, str) and not (scripts and one.startswith(scripts))]
-    told = {"root": ROOT.as_posix(), "path": path, "arguments": arguments}
-    code = CHILD.format(told=ascii(json.dumps(told)))
+    path = [entry for entry in sys.path if isinstance(entry, str) and not (scripts and entry.startswith(scripts))]
+    parameters = {"root": ROOT.as_posix(), "path": path, "arguments": arguments}
+    code = CHILD.format(told=ascii(json.dumps(parameters)))
     if bpy.app.binary_path:
-        how = "--background --factory-startup -noaudio --python-exit-code 1 --python-expr"
-        return [bpy.app.binary_path, *how.split(), code]
+        flags = "--background --factory-startup -noaudio --python-exit-code 1 --python-expr"
+        return [bpy.app.binary_path, *flags.split(), code]
     return [sys.executable, "-c", code]

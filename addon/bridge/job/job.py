@@ -20,11 +20,11 @@ from ...core.parallel import ONE_BLAS_THREAD
 from ...temporary import RunFolder
 
 GRACE: Shown[float] = 0.5
-"""Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
+"""Seconds between the request to stop and the end of the process: finished stages are whole files by then."""
 RUNNING, STOPPED, DONE, FAILED = "running", "stopped", "done", "failed"
 STOPPED_TEXT = "Stopped; the finished stages are kept and the next run goes on from them."
-SPOKEN = "scan-relight: "
-"""How the command line begins its errors."""
+ERROR_PREFIX = "scan-relight: "
+"""Prefix of the command line's errors."""
 
 
 class Job:
@@ -35,7 +35,7 @@ class Job:
     command : sequence of str
         Program and arguments; ends its work when its standard input ends.
     **facts
-        Whatever the interface has to remember of it; kept in `facts`.
+        What the interface has to remember of it; kept in `facts`.
 
     Attributes
     ----------
@@ -61,9 +61,9 @@ class Job:
         self.sentence, self.text = "", ""
         self.answer: dict = {}
         self.started, self.ended = time.monotonic(), None
-        self._left: float | None = None
-        self._said = self.started
-        self._wished: float | None = None
+        self._estimate: float | None = None
+        self._estimated_at = self.started
+        self._stop_requested_at: float | None = None
         self._errors: deque[str] = deque(maxlen=40)
         self._finished = threading.Event()
         flags = {"start_new_session": True}
@@ -99,7 +99,7 @@ class Job:
     @property
     def stopping(self) -> bool:
         """Whether it was asked to stop and has not ended yet."""
-        return self.running and self._wished is not None
+        return self.running and self._stop_requested_at is not None
 
     @property
     def seconds(self) -> float:
@@ -108,14 +108,14 @@ class Job:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimate that counts down between the run's own; None while nothing can be said."""
-        return None if self._left is None else max(self._left - (time.monotonic() - self._said), 0.0)
+        """Estimate that counts down between the run's own; None while there is none."""
+        return None if self._estimate is None else max(self._estimate - (time.monotonic() - self._estimated_at), 0.0)
 
     def stop(self) -> None:
-        """Ask for its end, and see to it within `GRACE` seconds; returns at once."""
-        if not self.running or self._wished is not None:
+        """Request its end, and kill it after `GRACE` seconds; returns at once."""
+        if not self.running or self._stop_requested_at is not None:
             return
-        self._wished = time.monotonic()
+        self._stop_requested_at = time.monotonic()
         threading.Thread(target=self._end, name="scan relight stop", daemon=True).start()
 
     def wait(self, timeout: float | None = None) -> bool:
@@ -132,7 +132,7 @@ class Job:
             self._process.kill()
 
     def _read(self) -> None:
-        other = []
+        output = []
         for line in self._process.stdout:
             text = line.decode("utf-8", "replace")
             try:
@@ -140,16 +140,16 @@ class Job:
             except ValueError:
                 event = None
             if event is None:
-                other.append(text)
+                output.append(text)
             else:
                 self._take(event)
-        self.text = "".join(other)
+        self.text = "".join(output)
 
     def _take(self, event: dict) -> None:
         kind = event.pop("event")
         if kind == "progress":
             self.stage, self.share, self.overall = event["stage"], event["share"], event["overall"]
-            self._left, self._said = event["seconds_left"], time.monotonic()
+            self._estimate, self._estimated_at = event["seconds_left"], time.monotonic()
         elif kind == "warning":
             self.warnings.append(event["text"])
         elif kind == "done":
@@ -170,7 +170,7 @@ class Job:
         self.ended = time.monotonic()
         if code == EXIT_OK:
             state = DONE
-        elif code == EXIT_INTERRUPTED or self._wished is not None:
+        elif code == EXIT_INTERRUPTED or self._stop_requested_at is not None:
             state, self.sentence = STOPPED, STOPPED_TEXT
         else:
             state, self.sentence = FAILED, self._reason(code)
@@ -179,16 +179,16 @@ class Job:
         self._finished.set()
 
     def _reason(self, code: int) -> str:
-        said = [line.removeprefix(SPOKEN) for line in self._errors if line.startswith(SPOKEN)]
-        if said:
-            return said[-1]
+        errors = [line.removeprefix(ERROR_PREFIX) for line in self._errors if line.startswith(ERROR_PREFIX)]
+        if errors:
+            return errors[-1]
         if code in (-9, 137):
             return (
                 "The system ended the run, most likely because memory ran out; the finished stages are kept. "
                 "Take a greater texel size or a smaller atlas size, or close other programs."
             )
-        last = next((line for line in reversed(self._errors) if line.strip()), "it left no word")
-        return f"The run ended with code {code}: {last[:300]}"
+        last_line = next((line for line in reversed(self._errors) if line.strip()), "it left no word")
+        return f"The run ended with code {code}: {last_line[:300]}"
 
 
 _alive: set[Job] = set()
@@ -215,7 +215,7 @@ def begin(command: Sequence[str], **facts: object) -> Job:
 
 
 def forget() -> None:
-    """Have no run any more; what is still going on is stopped."""
+    """Drop the current run; stops it if it is still going on."""
     global _current
     if _current is not None:
         _current.stop()

@@ -114,7 +114,7 @@ def refit(
             store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
         report = again.write_images()
         progress.update(0.7)
-        report["warnings"] = [one for one in report["warnings"] if one != OUTDATED] + [OUTDATED] * (not scene)
+        report["warnings"] = [text for text in report["warnings"] if text != OUTDATED] + [OUTDATED] * (not scene)
         if scene:
             capture = result.room.capture
             frames = again.room_poses().of(capture.frames)
@@ -126,10 +126,10 @@ def refit(
     return report
 
 
-def write_recovered(done: Recovery | Refit, facing: Capture, fresh: bool) -> tuple[str, ...]:
-    """Write scene.blend of what was recovered; `facing`: the capture with the mesh that is written."""
-    uv, materials, folder = done.surface().shown_uv, done.materials(), done.store.folder
-    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance, fresh, done.parts)
+def write_recovered(recovery: Recovery | Refit, capture: Capture, fresh: bool) -> tuple[str, ...]:
+    """Write scene.blend of what was recovered; `capture`: the capture with the mesh that is written."""
+    uv, materials, folder = recovery.surface().shown_uv, recovery.materials(), recovery.store.folder
+    return write_scene(folder / SCENE, capture, uv, materials, folder, recovery.median_radiance, fresh, recovery.parts)
 
 
 def versions() -> dict[str, str]:

@@ -18,7 +18,7 @@ _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 MAX_FACTOR: Limit[float] = 1000.0
 
 radiance = emission
-"""What a lamp emits now, linear Rec.709 in the frames' unit."""
+"""Radiance that a lamp emits at present, linear Rec.709 in the frames' unit."""
 
 
 def is_lamp(material: bpy.types.Material | None) -> bool:
@@ -34,29 +34,29 @@ def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:
 
 def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material]]:
     """Each lamp of a scene once, under the name of the first object that wears it."""
-    found, seen = {}, set()
-    for thing in scene.objects:
-        for slot in thing.material_slots if thing.type == "MESH" else ():
+    lamps, seen = {}, set()
+    for obj in scene.objects:
+        for slot in obj.material_slots if obj.type == "MESH" else ():
             if slot.material not in seen:
                 seen.add(slot.material)
                 if is_lamp(slot.material):
-                    found.setdefault(thing.name, []).append(slot.material)
-    return found
+                    lamps.setdefault(obj.name, []).append(slot.material)
+    return lamps
 
 
 def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
-    """The lamps that a name means: that very material, or all of that class; raises `BadInputError` without any."""
+    """The lamps that match a name: that very material, or all of that class; raises `BadInputError` without any."""
     lamps = find_lamps(scene)
-    wanted = name.strip().casefold()
-    found = [m for m in lamps if m.name.casefold() == wanted] or [
-        m for m in lamps if numbered(m.name.casefold())[0] == wanted
+    query = name.strip().casefold()
+    matches = [m for m in lamps if m.name.casefold() == query] or [
+        m for m in lamps if numbered(m.name.casefold())[0] == query
     ]
-    if not found:
+    if not matches:
         known = ", ".join(f"'{m.name}'" for m in lamps)
         raise BadInputError(
             f"There is no lamp '{name}'; " + (f"known are {known}." if known else "the scan has no lamp at all.")
         )
-    return found
+    return matches
 
 
 def is_on(material: bpy.types.Material) -> bool:
@@ -104,14 +104,14 @@ def kelvin(material: bpy.types.Material) -> float:
 
 def set_kelvin(material: bpy.types.Material, value: float) -> None:
     """Give the light the colour of a temperature, at the same luminance; without effect where a picture gives it."""
-    now = colour(material)
-    if now is not None:
-        bright = luminance(now)
+    current = colour(material)
+    if current is not None:
+        bright = luminance(current)
         set_colour(material, tuple(bright * c for c in rgb_of(min(max(value, LOWEST), HIGHEST))))
 
 
 def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:
-    """What the scan found, linear Rec.709 in the frames' unit."""
+    """Radiance that was recovered, linear Rec.709 in the frames' unit."""
     node, socket = principled(material), emission_socket(material)
     strength = material.get(_STRENGTH, node.inputs[EMISSION_STRENGTH].default_value)
     tint = material.get(_COLOUR) or (socket.default_value[:3] if socket is not None else (1.0, 1.0, 1.0))
@@ -131,7 +131,7 @@ def is_coloured(material: bpy.types.Material) -> bool:
 
 
 def restore(material: bpy.types.Material) -> None:
-    """Make a lamp exactly what was recovered."""
+    """Reset a lamp to what was recovered."""
     if _STRENGTH not in material:
         return
     inputs, socket = principled(material).inputs, emission_socket(material)
@@ -172,7 +172,7 @@ def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
     if _STRENGTH not in material or not is_lamp(material):
         return []
     inputs = principled(material).inputs
-    return [one for one in (inputs[EMISSION_STRENGTH], emission_socket(material)) if one is not None]
+    return [socket for socket in (inputs[EMISSION_STRENGTH], emission_socket(material)) if socket is not None]
 
 
 def _keep(material):

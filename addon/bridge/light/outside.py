@@ -22,10 +22,10 @@ RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
 HDRI = "scan_relight_hdri"
 """Custom property of a world of ours: the path of the picture that it shows."""
-_OFF, _FACTOR, _KEPT = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
-_TURN, _PLACE = "Scan Relight turn", "Scan Relight place"
+_OFF, _FACTOR, _STRENGTH = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
+_TURN, _COORDINATES = "Scan Relight turn", "Scan Relight place"
 MAX_FACTOR: Limit[float] = 1000.0
-_BRIGHTER = 4.0
+_OUTDOOR_FACTOR = 4.0
 """Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
 which shows through openings that cover a small part of what any spot of the room sees."""
 
@@ -73,12 +73,12 @@ def set_rotation(world: bpy.types.World, angle: float) -> None:
         return
     tree, turn = world.node_tree, world.node_tree.nodes.get(_TURN)
     if not angle:
-        for node in filter(None, map(tree.nodes.get, (_TURN, _PLACE))):
+        for node in filter(None, map(tree.nodes.get, (_TURN, _COORDINATES))):
             tree.nodes.remove(node)
         return
     if turn is None:
-        place = add_node(tree, "ShaderNodeTexCoord", name=_PLACE, location=(-700, 0))
-        turn = add_node(tree, "ShaderNodeMapping", place.outputs["Generated"], name=_TURN, location=(-500, 0))
+        coordinates = add_node(tree, "ShaderNodeTexCoord", name=_COORDINATES, location=(-700, 0))
+        turn = add_node(tree, "ShaderNodeMapping", coordinates.outputs["Generated"], name=_TURN, location=(-500, 0))
         feed(texture.inputs["Vector"], turn.outputs["Vector"])
     # The node turns the direction that is looked up, and so the picture the other way round.
     turn.inputs["Rotation"].default_value = (0, 0, -angle)
@@ -114,8 +114,8 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
         image.colorspace_settings.name = RADIANCE
     strength = 1.0
     if mean is not None:
-        found = mean_radiance(image)
-        strength = mean / found if found > 0 else 1.0
+        picture_mean = mean_radiance(image)
+        strength = mean / picture_mean if picture_mean > 0 else 1.0
     if HDRI not in (scene.world or {}) and scene.world is not None:
         scene[RECOVERED] = scene.world
     scene.world = make_world(f"Scan Relight {path.stem}", image, strength)
@@ -124,7 +124,7 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
 
 
 def restore(scene: bpy.types.Scene) -> None:
-    """Make the outside exactly what was recovered."""
+    """Reset the outside to what was recovered."""
     if scene.get(RECOVERED) is not None:
         scene.world = scene[RECOVERED]
     scene.pop(RECOVERED, None)
@@ -132,9 +132,9 @@ def restore(scene: bpy.types.Scene) -> None:
     if world is None:
         return
     set_rotation(world, 0.0)
-    if _KEPT in world:
-        find_node(world, "BACKGROUND").inputs["Strength"].default_value = world[_KEPT]
-    for name in (_KEPT, _OFF, _FACTOR):
+    if _STRENGTH in world:
+        find_node(world, "BACKGROUND").inputs["Strength"].default_value = world[_STRENGTH]
+    for name in (_STRENGTH, _OFF, _FACTOR):
         world.pop(name, None)
 
 
@@ -161,24 +161,24 @@ def strength(world: bpy.types.World | None) -> float:
 
 def recovered_strength(world: bpy.types.World | None) -> float:
     """`strength` as it was recovered."""
-    return float(world.get(_KEPT, strength(world))) if world is not None else 0.0
+    return float(world.get(_STRENGTH, strength(world))) if world is not None else 0.0
 
 
 def usual_radiance(scene: bpy.types.Scene) -> float:
     """Mean radiance that a picture around this room is scaled to, in the frames' unit."""
-    return _BRIGHTER * room_light(scene) / math.pi
+    return _OUTDOOR_FACTOR * room_light(scene) / math.pi
 
 
 def is_open(scene: bpy.types.Scene) -> bool:
     """Whether light from outside can reach what the camera looks at, or the room's middle: any of 256 rays leaves."""
-    places = [sum(bounds(scene), Vector()) / 2]
+    points = [sum(bounds(scene), Vector()) / 2]
     if scene.camera:
-        places.append(scene.camera.matrix_world.translation)
-    return any(leaves(scene, place, direction) for place in places for direction in map(Vector, fibonacci(128)))
+        points.append(scene.camera.matrix_world.translation)
+    return any(leaves(scene, point, direction) for point in points for direction in map(Vector, fibonacci(128)))
 
 
 def remarks(scene: bpy.types.Scene) -> list[str]:
-    """What there is to say, in sentences, of a picture around this room."""
+    """Remarks, one sentence each, on a picture around this room."""
     return [] if is_open(scene) else ["The scanned room is closed, so the picture around it sends no light in."]
 
 
@@ -201,7 +201,7 @@ def snapshot(world: bpy.types.World | None) -> dict:
     """The state of a world for `put_back`."""
     if world is None:
         return {}
-    return {"on": is_on(world), "factor": factor(world), "rotation": rotation(world), "touched": _KEPT in world}
+    return {"on": is_on(world), "factor": factor(world), "rotation": rotation(world), "touched": _STRENGTH in world}
 
 
 def put_back(world: bpy.types.World | None, state: dict) -> None:
@@ -218,19 +218,19 @@ def state_sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
     """The inputs that show the state of the light from outside."""
     texture = find_node(world, "TEX_ENVIRONMENT")
     turned = [texture.inputs["Vector"]] if texture is not None and rotation(world) else []
-    return turned + ([find_node(world, "BACKGROUND").inputs["Strength"]] if _KEPT in world else [])
+    return turned + ([find_node(world, "BACKGROUND").inputs["Strength"]] if _STRENGTH in world else [])
 
 
 def _keep(world):
     node = find_node(world, "BACKGROUND")
-    if node is not None and _KEPT not in world:
-        world[_KEPT] = node.inputs["Strength"].default_value
+    if node is not None and _STRENGTH not in world:
+        world[_STRENGTH] = node.inputs["Strength"].default_value
 
 
 def _show(world):
     node = find_node(world, "BACKGROUND")
     if node is not None:
-        node.inputs["Strength"].default_value = world[_KEPT] * factor(world) * is_on(world)
+        node.inputs["Strength"].default_value = world[_STRENGTH] * factor(world) * is_on(world)
 
 
 _ROWS, _COLUMNS = 8, 16
@@ -238,7 +238,7 @@ _maps: dict[tuple, np.ndarray] = {}
 
 
 def sky(world: bpy.types.World, turn: float) -> list[tuple[Vector, float]]:
-    """What a world sends in at strength 1, field by field; nothing where it shows no light.
+    """The light that a world of strength 1 sends in, field by field; nothing where it shows no light.
 
     Parameters
     ----------
@@ -260,12 +260,14 @@ def sky(world: bpy.types.World, turn: float) -> list[tuple[Vector, float]]:
         light = np.full((_ROWS, _COLUMNS), float(np.array(socket.default_value[:3]) @ LUMINANCE))
     # As Cycles lays it: the picture's middle is -X, and its rows go from below to above.
     rims = np.sin(np.linspace(-math.pi / 2, math.pi / 2, _ROWS + 1))
-    found = []
+    samples = []
     for row, column in np.ndindex(light.shape):
         angle, z = turn + math.pi * (1 - (2 * column + 1) / _COLUMNS), (rims[row] + rims[row + 1]) / 2
-        level, part = math.sqrt(1 - z * z), (rims[row + 1] - rims[row]) * 2 * math.pi / _COLUMNS
-        found.append((Vector((level * math.cos(angle), level * math.sin(angle), z)), float(light[row, column] * part)))
-    return found
+        level, solid_angle = math.sqrt(1 - z * z), (rims[row + 1] - rims[row]) * 2 * math.pi / _COLUMNS
+        samples.append(
+            (Vector((level * math.cos(angle), level * math.sin(angle), z)), float(light[row, column] * solid_angle))
+        )
+    return samples
 
 
 def _fields(image: bpy.types.Image) -> np.ndarray:
@@ -275,6 +277,6 @@ def _fields(image: bpy.types.Image) -> np.ndarray:
         pixels = np.nan_to_num(image_array(image)[..., :3], posinf=0.0).clip(0) @ LUMINANCE
         for axis, count in enumerate((_ROWS, _COLUMNS)):
             pixels = pixels.repeat(max(-(-count // pixels.shape[axis]), 1), axis)
-            pixels = np.stack([part.mean(axis) for part in np.array_split(pixels, count, axis)], axis)
+            pixels = np.stack([block.mean(axis) for block in np.array_split(pixels, count, axis)], axis)
         _maps[key] = pixels
     return _maps[key]

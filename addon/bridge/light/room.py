@@ -1,4 +1,4 @@
-"""What a new light or thing has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
+"""What a new light or object has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
 
 import math
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from ..marks import OBJECT_ID
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
 PICTURE = tuple(((k % 11 + 0.5) / 11, (k // 11 + 0.5) / 11) for k in range(11 * 11))
-"""Places of the picture, as `picture_ray` takes them, at which what it shows is looked at."""
+"""Points of the picture, as `picture_ray` takes them, at which it is sampled."""
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
@@ -33,33 +33,31 @@ class Hit(NamedTuple):
 
 def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The objects that were scanned. Raises `BadInputError`: the scene has none."""
-    things = [thing for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"]
-    if not things:
+    objects = [obj for obj in scene.objects if OBJECT_ID in obj and obj.type == "MESH"]
+    if not objects:
         raise BadInputError(
             f"Scene '{scene.name}' holds no scanned room; recover a capture or open a result's scene.blend first."
         )
-    return things
+    return objects
 
 
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
     """Lowest and highest corner of the scanned room in metres; raises `BadInputError` where there is none."""
-    corners = np.array(
-        [thing.matrix_world @ Vector(corner) for thing in room_objects(scene) for corner in thing.bound_box]
-    )
+    corners = np.array([obj.matrix_world @ Vector(corner) for obj in room_objects(scene) for corner in obj.bound_box])
     return Vector(corners.min(0)), Vector(corners.max(0))
 
 
 def cast(scene: bpy.types.Scene, origin: Vector, direction: Vector, distance: float = 1e4) -> Hit | None:
     """The first surface along a ray."""
     direction = direction.normalized()
-    hit, place, normal, _, thing, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
+    hit, place, normal, _, obj, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
     if not hit:
         return None
-    return Hit(place, -normal if normal.dot(direction) > 0 else normal, (place - origin).length, thing)
+    return Hit(place, -normal if normal.dot(direction) > 0 else normal, (place - origin).length, obj)
 
 
 def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
-    """Whether a ray leaves the room; what lets most of the light through, such as a pane, does not hold it."""
+    """Whether a ray leaves the room; what transmits most of the light, such as a pane, does not stop it."""
     for _ in range(8):
         hit = cast(scene, origin, direction)
         if hit is None:
@@ -77,14 +75,14 @@ def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     return layer.depsgraph
 
 
-def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object | None = None) -> Vector:
+def target_of(scene: bpy.types.Scene, kind: str = VIEW, obj: bpy.types.Object | None = None) -> Vector:
     """What a light is aimed at.
 
     Parameters
     ----------
     kind : str
         `VIEW`: the surface in the middle of the camera's picture, or the room's middle without a camera; `CURSOR`:
-        the 3D cursor; `OBJECT`: the middle of `thing`'s box.
+        the 3D cursor; `OBJECT`: the middle of `obj`'s box.
 
     Raises
     ------
@@ -92,9 +90,9 @@ def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object 
         `OBJECT` without an object, or no room in the scene.
     """
     if kind == OBJECT:
-        if thing is None:
+        if obj is None:
             raise BadInputError("No object is selected to aim the light at; select one or aim at the view instead.")
-        return sum((thing.matrix_world @ Vector(c) for c in thing.bound_box), Vector()) / 8
+        return sum((obj.matrix_world @ Vector(c) for c in obj.bound_box), Vector()) / 8
     if kind == CURSOR:
         return scene.cursor.location.copy()
     low, high = bounds(scene)
@@ -126,13 +124,13 @@ def view_direction(scene: bpy.types.Scene) -> Vector:
 
 
 def room_light(scene: bpy.types.Scene) -> float:
-    """Median irradiance of the scanned room's surfaces in the frames' unit: by the shading, else by the exposure."""
-    kept = scene.get(ROOM_LIGHT)
-    if kept:
-        return float(kept)
-    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / USUAL_ALBEDO
-    scene[ROOM_LIGHT] = found
-    return found
+    """Median irradiance of the scanned room's surfaces in the frames' unit: by the shading, else the exposure."""
+    stored = scene.get(ROOM_LIGHT)
+    if stored:
+        return float(stored)
+    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / USUAL_ALBEDO
+    scene[ROOM_LIGHT] = irradiance
+    return irradiance
 
 
 def _median_shading() -> float | None:

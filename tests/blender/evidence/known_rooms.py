@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from addon.bridge.demo.render import render_frames
-from addon.bridge.demo.room import SIZE, Paint, Thing, grid, look_at, room, tour, write_all_but_frames
+from addon.bridge.demo.room import SIZE, Paint, RoomObject, grid, look_at, room, tour, write_all_but_frames
 from addon.core.brdf.compensation import layer_reflectance
 from addon.core.progress import Progress
 from addon.core.scene.atlas import Atlas
@@ -18,7 +18,7 @@ from addon.core.scene.atlas import Atlas
 class KnownRoom:
     """A room whose paints are known, and a walk through it, (frames, 4, 4)."""
 
-    things: tuple[Thing, ...]
+    things: tuple[RoomObject, ...]
     poses: np.ndarray
 
     def render(self, folder: Path, size: tuple[int, int], samples: int) -> Path:
@@ -42,7 +42,7 @@ class KnownRoom:
         return result
 
 
-def base_colour(thing: Thing, atlas: Atlas, own: np.ndarray) -> np.ndarray:
+def base_colour(thing: RoomObject, atlas: Atlas, own: np.ndarray) -> np.ndarray:
     """Mean base colour over the texels of a thing's elements `own`, (m, 3)."""
     if len(thing.paints) == 1 and thing.paints[0].albedo.ndim == 1:
         return np.broadcast_to(thing.paints[0].albedo, (len(own), 3))
@@ -54,7 +54,7 @@ def base_colour(thing: Thing, atlas: Atlas, own: np.ndarray) -> np.ndarray:
     return np.mean([_colour_at(thing, atlas.position[own] + edge * (a * across + b * up)) for a, b in shifts], 0)
 
 
-def _colour_at(thing: Thing, points: np.ndarray) -> np.ndarray:
+def _colour_at(thing: RoomObject, points: np.ndarray) -> np.ndarray:
     """Base colour of a thing's nearest quad at points (m, 3)."""
     best, quad = np.full(len(points), np.inf), np.zeros(len(points), int)
     place = np.zeros((len(points), 2))
@@ -72,7 +72,9 @@ def _colour_at(thing: Thing, points: np.ndarray) -> np.ndarray:
     return thing.colours(thing.slot[quad], uv)
 
 
-def _repainted(things: tuple[Thing, ...], seed: int, low: float, high: float, glossy: dict[str, tuple[float, float]]):
+def _repainted(
+    things: tuple[RoomObject, ...], seed: int, low: float, high: float, glossy: dict[str, tuple[float, float]]
+):
     """The same things with each plain colour drawn anew between `low` and `high`; `glossy`: roughness and F0."""
     rng = np.random.default_rng(seed)
     result = []
@@ -89,7 +91,9 @@ def _repainted(things: tuple[Thing, ...], seed: int, low: float, high: float, gl
     return tuple(result)
 
 
-def _glowing(things: tuple[Thing, ...], radiance: dict[str, tuple[float, float, float] | None]) -> tuple[Thing, ...]:
+def _glowing(
+    things: tuple[RoomObject, ...], radiance: dict[str, tuple[float, float, float] | None]
+) -> tuple[RoomObject, ...]:
     """The same with other lamps; None takes one away."""
     result = []
     for thing in things:
@@ -101,7 +105,7 @@ def _glowing(things: tuple[Thing, ...], radiance: dict[str, tuple[float, float, 
     return tuple(result)
 
 
-def _with_window(things: tuple[Thing, ...]) -> tuple[Thing, ...]:
+def _with_window(things: tuple[RoomObject, ...]) -> tuple[RoomObject, ...]:
     """The papered wall gets an opening, with a bright panel outside."""
     x, y, z = SIZE
     low, high, sill, top = 2.2, 3.6, 0.9, 2.1
@@ -113,7 +117,7 @@ def _with_window(things: tuple[Thing, ...]) -> tuple[Thing, ...]:
     glow = Paint(np.zeros(3, np.float32), emission=(5.0, 6.0, 7.5))
     wall = next(thing for thing in things if thing.class_name == "papered wall")
     cut = replace(wall, quads=quads, uv=uv, slot=np.zeros(len(quads), int))
-    outside = Thing(max(thing.object_id for thing in things) + 1, "panel", *panel, np.zeros(4, int), (glow,))
+    outside = RoomObject(max(thing.object_id for thing in things) + 1, "panel", *panel, np.zeros(4, int), (glow,))
     return tuple(cut if thing is wall else thing for thing in things) + (outside,)
 
 

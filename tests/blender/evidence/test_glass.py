@@ -9,7 +9,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.data.unwrap import unwrap  # noqa: E402
 from addon.bridge.demo import render  # noqa: E402
-from addon.bridge.demo.room import Paint, Thing, grid, room, tour  # noqa: E402
+from addon.bridge.demo.room import Paint, RoomObject, grid, room, tour  # noqa: E402
 from addon.core.brdf.transparent import TRANSPARENT  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402
 from addon.core.passes.albedo.albedo import NONE  # noqa: E402
@@ -24,14 +24,14 @@ pytestmark = [pytest.mark.slow, pytest.mark.arithmetic]
 PANE = "pane"
 
 
-def slab(object_id: int, corner, across, up, thickness: float) -> Thing:
+def slab(object_id: int, corner, across, up, thickness: float) -> RoomObject:
     """The two large sides of a standing slab."""
     corner, across, up = (np.array(x, float) for x in (corner, across, up))
     off = np.cross(up, across)
     off *= thickness / np.linalg.norm(off)
     sides = [grid(corner, across, up, 4, 4), grid(corner + off + across, -across, up, 4, 4)]
     quads, uv = (np.concatenate(parts) for parts in zip(*sides))
-    return Thing(object_id, PANE, quads, uv, np.zeros(len(quads), int), (Paint(np.ones(3, np.float32)),))
+    return RoomObject(object_id, PANE, quads, uv, np.zeros(len(quads), int), (Paint(np.ones(3, np.float32)),))
 
 
 def material(name: str, paint: Paint):
