@@ -30,7 +30,7 @@ WHEELS = ROOT / "wheels"
 CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "operators")
 """What goes into the zip, besides the manifest and the wheels."""
 LEFT_OUT = "addon/farm"
-"""What does not: Blender's window has no use for it, and it talks to managers over the network."""
+"""What does not: it is of no use in Blender's window, and it connects to render managers over the network."""
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", r"manylinux.*x86_64"),
     "windows-x64": ("win_amd64", r"win_amd64"),
@@ -64,12 +64,12 @@ def main() -> int:
             name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}"
             if not arguments.together:
                 name += f"-py{versions[0].replace('.', '')}"
-            made = arguments.out / f"{name}.zip"
+            archive = arguments.out / f"{name}.zip"
             with tempfile.TemporaryDirectory() as scratch:
                 stage(Path(scratch), platform, set(wheels))
                 command = [sys.executable, builder, "build", "--source-dir", scratch]
-                subprocess.run([*command, "--output-filepath", made.resolve()], check=True)
-            print(f"{made}  {made.stat().st_size / 1e6:.1f} MB")
+                subprocess.run([*command, "--output-filepath", archive.resolve()], check=True)
+            print(f"{archive}  {archive.stat().st_size / 1e6:.1f} MB")
     return 0
 
 
@@ -82,31 +82,31 @@ def python_of(wheel: str) -> str:
 def blender_ext() -> Path:
     """Blender's extension builder, which also runs under plain Python."""
     bpy = importlib.util.find_spec("bpy")
-    found = sorted(Path(bpy.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")) if bpy else []
-    if not found:
+    builders = sorted(Path(bpy.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")) if bpy else []
+    if not builders:
         sys.exit(
             "This Python has no bpy, which brings the extension builder; run it as: "
             ".venv/bin/python scripts/build_extension.py"
         )
-    return found[-1]
+    return builders[-1]
 
 
 def locked_hashes(packages: set[str]) -> dict[str, tuple[str, set[str]]]:
     """Each package's pinned requirement and its allowed hashes."""
-    found = {}
+    locked = {}
     locks = "".join(path.read_text(encoding="utf-8") for path in LOCKS)
     for block in re.split(r"^(?=\S)", locks, flags=re.MULTILINE):
         requirement = block.split(" ")[0]
         name = requirement.split("==")[0]
         if name in packages:
-            found[name] = requirement, set(re.findall(r"--hash=sha256:([0-9a-f]{64})", block))
-    if missing := packages - set(found):
+            locked[name] = requirement, set(re.findall(r"--hash=sha256:([0-9a-f]{64})", block))
+    if missing := packages - set(locked):
         sys.exit(f"{' and '.join(path.name for path in LOCKS)} do not pin {', '.join(sorted(missing))}.")
-    return found
+    return locked
 
 
 def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]]]) -> None:
-    """Have every wheel of `names` in wheels/, with an allowed hash."""
+    """Download the wheels of `names` into wheels/, unless they are there with an allowed hash."""
     WHEELS.mkdir(exist_ok=True)
     for name in names:
         package = name.split("-")[0]
@@ -120,8 +120,8 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                 (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
                 pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
                 only = ["--only-binary=:all:", "--require-hashes", "--platform", PLATFORMS[platform][0]]
-                what = ["--python-version", python_of(name), "-r", Path(scratch) / "wheel.txt", "--dest", WHEELS]
-                subprocess.run([*pip, *only, *what], check=True)
+                request = ["--python-version", python_of(name), "-r", Path(scratch) / "wheel.txt", "--dest", WHEELS]
+                subprocess.run([*pip, *only, *request], check=True)
         if not wheel.is_file():
             sys.exit(f"pip fetched another wheel of {requirement} than the manifest's {name}; mend the manifest.")
 
@@ -132,12 +132,12 @@ def sha256(path: Path) -> str:
 
 
 def stage(folder: Path, platform: str, wheels: set[str]) -> None:
-    """Put what belongs into the zip into `folder`, with a manifest that names only `platform` and `wheels`."""
-    leave = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+    """Copy the zip's content into `folder`, with a manifest that names only `platform` and `wheels`."""
+    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
     for name in CONTENT:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=leave)
+            shutil.copytree(source, folder / name, ignore=ignored)
         else:
             shutil.copy2(source, folder / name)
     shutil.rmtree(folder / LEFT_OUT)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {"label", "operator", "prop", "menu", "operator_menu_enum"}
-"""Calls on a layout whose `text` is shown."""
+"""Methods of a layout whose `text` is displayed."""
 SENTENCES = {"say": 1, "check": 2, "poll_message_set": 0, "told": 0, "needs": 1, "folded": 2}
-"""Calls that take a sentence, and where it stands among their arguments."""
+"""Functions that take a sentence, and its index among their arguments."""
 
 
 def main() -> int:
@@ -26,10 +26,10 @@ def main() -> int:
     parser.add_argument("--missing", metavar="LANGUAGE", help="only what operators/translations lacks of a language")
     arguments = parser.parse_args()
     scan_relight.register()
-    found = collect()
+    strings = collect()
     if arguments.missing:
-        found -= set(importlib.import_module("scan_relight.operators.translations").texts(arguments.missing))
-    print("\n".join(sorted(found)))
+        strings -= set(importlib.import_module("scan_relight.operators.translations").texts(arguments.missing))
+    print("\n".join(sorted(strings)))
     scan_relight.unregister()
     return 0
 
@@ -45,37 +45,37 @@ def registered() -> set[str]:
     from scan_relight import operators
     from scan_relight.addon.core.stages import LABELS
 
-    found = set(LABELS.values())
+    strings = set(LABELS.values())
     for cls in operators.classes():
-        found |= {getattr(cls, "bl_label", ""), getattr(cls, "bl_description", "")}
+        strings |= {getattr(cls, "bl_label", ""), getattr(cls, "bl_description", "")}
         if issubclass(cls, bpy.types.Operator):
             known = getattr(bpy.ops.scan_relight, cls.bl_idname.partition(".")[2]).get_rna_type().properties
         else:
-            own = {name for base in cls.__mro__ for name in getattr(base, "__annotations__", ())}
-            known = [prop for prop in cls.bl_rna.properties if prop.identifier in own]
+            annotated = {name for base in cls.__mro__ for name in getattr(base, "__annotations__", ())}
+            known = [prop for prop in cls.bl_rna.properties if prop.identifier in annotated]
         for prop in known:
             if prop.identifier == "rna_type" or prop.is_hidden:
                 continue
-            found |= {prop.name, prop.description}
+            strings |= {prop.name, prop.description}
             if prop.type == "ENUM":
-                found |= {text for item in prop.enum_items for text in (item.name, item.description)}
-    return found
+                strings |= {text for item in prop.enum_items for text in (item.name, item.description)}
+    return strings
 
 
 def written() -> set[str]:
     """Texts in the code of panels and polls."""
-    found = set()
+    strings = set()
     for path in (ROOT / "operators").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call) or not isinstance(node.func, (ast.Attribute, ast.Name)):
                 continue
             name = node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id
             if name in TEXTS:
-                shown = [one.value for one in node.keywords if one.arg == "text"]
-                found |= {text for one in shown for text in texts(one) if "{}" not in text}
+                values = [keyword.value for keyword in node.keywords if keyword.arg == "text"]
+                strings |= {text for value in values for text in texts(value) if "{}" not in text}
             elif name in SENTENCES and len(node.args) > SENTENCES[name]:
-                found |= set(texts(node.args[SENTENCES[name]]))
-    return found
+                strings |= set(texts(node.args[SENTENCES[name]]))
+    return strings
 
 
 def texts(node: ast.expr) -> list[str]:
@@ -87,7 +87,7 @@ def texts(node: ast.expr) -> list[str]:
     if isinstance(node, ast.IfExp):
         return texts(node.body) + texts(node.orelse)
     if isinstance(node, ast.JoinedStr):
-        return ["".join(one.value if isinstance(one, ast.Constant) else "{}" for one in node.values)]
+        return ["".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)]
     return []
 
 

@@ -25,8 +25,8 @@ KINDS = [
     if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("Annotated[")
 ]
 PLAIN = {value / 2 for value in range(9)}
-"""Numbers that say nothing when they stand in code: 0, 0.5, 1, ... 4."""
-LEAST = 1e-5
+"""Numbers that are not counted in code: 0, 0.5, 1, ... 4."""
+SMALLEST = 1e-5
 """Smaller ones keep quotients and logarithms finite."""
 
 
@@ -38,7 +38,9 @@ def is_number(node: ast.expr) -> bool:
         return is_number(node.operand)
     if isinstance(node, ast.BinOp):
         return is_number(node.left) and is_number(node.right)
-    return isinstance(node, (ast.Tuple, ast.List)) and bool(node.elts) and all(is_number(one) for one in node.elts)
+    return (
+        isinstance(node, (ast.Tuple, ast.List)) and bool(node.elts) and all(is_number(element) for element in node.elts)
+    )
 
 
 def constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
@@ -50,17 +52,17 @@ def constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
         if not isinstance(node, ast.Assign) or not is_number(node.value):
             continue
         for target in node.targets:
-            for one in target.elts if isinstance(target, ast.Tuple) else [target]:
-                yield ast.unparse(one), ""
+            for element in target.elts if isinstance(target, ast.Tuple) else [target]:
+                yield ast.unparse(element), ""
 
 
 def params(tree: ast.Module) -> Iterator[str]:
     """Numeric fields of classes called `...Params`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef) and node.name.endswith("Params"):
-            for one in node.body:
-                if isinstance(one, ast.AnnAssign) and one.value is not None and is_number(one.value):
-                    yield f"{node.name}.{ast.unparse(one.target)}"
+            for statement in node.body:
+                if isinstance(statement, ast.AnnAssign) and statement.value is not None and is_number(statement.value):
+                    yield f"{node.name}.{ast.unparse(statement.target)}"
 
 
 def in_code(tree: ast.Module) -> Iterator[str]:
@@ -69,21 +71,21 @@ def in_code(tree: ast.Module) -> Iterator[str]:
         if isinstance(function, (ast.FunctionDef, ast.Lambda)):
             for node in ast.walk(function):
                 if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-                    if abs(node.value) not in PLAIN and abs(node.value) > LEAST:
+                    if abs(node.value) not in PLAIN and abs(node.value) > SMALLEST:
                         yield f"{node.value:g} ({node.lineno})"
 
 
 def main(argv: list[str]) -> int:
     show = "--list" in argv
-    folders = [one for one in argv if one != "--list"] or ["addon", "operators"]
+    folders = [argument for argument in argv if argument != "--list"] or ["addon", "operators"]
     loose, fields, inline, kinds = Counter(), Counter(), Counter(), Counter()
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*.py")):
             tree = ast.parse(path.read_text(encoding="utf-8"))
             where = path.parent.relative_to(ROOT).as_posix()
-            found = list(constants(tree))
-            kinds.update(kind for _, kind in found if kind)
-            chosen = [name for name, kind in found if not kind]
+            numbers = list(constants(tree))
+            kinds.update(kind for _, kind in numbers if kind)
+            chosen = [name for name, kind in numbers if not kind]
             for count, names in ((loose, chosen), (fields, list(params(tree))), (inline, sorted(set(in_code(tree))))):
                 count[where] += len(names)
                 if show and names:

@@ -56,8 +56,8 @@ def prepare(tools: bool = False, folder: Path = ROOT / ".venv") -> Path:
     lock = lock_for(sys.version_info[:2])
     with_tools = [lock, ROOT / "requirements" / TOOLS]
     python, stamp = program(folder, "python"), folder / STAMP
-    found = stamp.read_text() if stamp.is_file() and python.exists() else ""
-    if found == stamp_of(with_tools) or (found == stamp_of([lock]) and not tools):
+    current = stamp.read_text() if stamp.is_file() and python.exists() else ""
+    if current == stamp_of(with_tools) or (current == stamp_of([lock]) and not tools):
         return python
     locks = with_tools if tools else [lock]
     print(
@@ -68,12 +68,12 @@ def prepare(tools: bool = False, folder: Path = ROOT / ".venv") -> Path:
     )
     stamp.unlink(missing_ok=True)
     settings = folder / "pyvenv.cfg"
-    if not (found and f"version = {platform.python_version()}\n" in settings.read_text()):
+    if not (current and f"version = {platform.python_version()}\n" in settings.read_text()):
         # Not over one that is good: its Python may be running, and can't be written then.
         venv.create(folder, with_pip=True, clear=True, symlinks=os.name != "nt")
     pip = [str(python), "-m", "pip", "--disable-pip-version-check", "--quiet"]
-    wanted = [option for path in locks for option in ("-r", str(path))]
-    run([*pip, "install", "--no-deps", "--only-binary=:all:", "--require-hashes", *wanted])
+    requirements = [option for path in locks for option in ("-r", str(path))]
+    run([*pip, "install", "--no-deps", "--only-binary=:all:", "--require-hashes", *requirements])
     # Building needs setuptools alone, which the lock has just brought; so nothing unpinned is fetched.
     run([*pip, "install", "--no-deps", "--no-build-isolation", "-e", str(ROOT)])
     stamp.write_text(stamp_of(locks))

@@ -29,13 +29,13 @@ from scripts.qa_rooms.held import projected_truth
 
 
 def without_excess(recovery: Recovery) -> np.ndarray:
-    """The albedo had glossy things thrown what their medians say."""
-    other = copy.copy(recovery)
-    found = recovery.specular()
-    other.done = recovery.done | {"specular": dataclasses.replace(found, excess=np.zeros_like(found.excess))}
+    """The albedo if glossy objects reflected only the radiance of their medians."""
+    variant = copy.copy(recovery)
+    specular = recovery.specular()
+    variant.done = recovery.done | {"specular": dataclasses.replace(specular, excess=np.zeros_like(specular.excess))}
     for name in ("irradiance", "albedo"):
-        other.__dict__.pop(name, None)
-    return other.albedo.rho
+        variant.__dict__.pop(name, None)
+    return variant.albedo.rho
 
 
 def main() -> int:
@@ -44,23 +44,26 @@ def main() -> int:
     with Store(result) as store:
         recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
         lit, shading = recovery.lit_diffuse(), recovery.shading()
-        seen = views(capture, recovery)
+        held_out = views(capture, recovery)
         base, albedo = recovery.base_color(), recovery.albedo
         specular = recovery.specular().specular
         raw, _ = quotient(np.maximum(lit.radiance - specular, 0), recovery.irradiance)
         medians = without_excess(recovery)
         measured = albedo.origin == MEASURED
         good = measured & (lit.tier == 0) & (lit.count >= 6)
-        limit = projected_truth(seen, len(lit.count), albedo.rho)
+        limit = projected_truth(held_out, len(lit.count), albedo.rho)
         rows = (
-            ("Base Color as written", psnr(seen, base)),
-            ("without the compensation for Principled's layering", psnr(seen, albedo.rho)),
-            ("that, and glossy things lighting by their median", psnr(seen, medians)),
-            ("... and the specular part left in the median", psnr(seen, recovery.albedo_under(shading.irradiance).rho)),
-            ("plain quotient: neither filled in nor shrunk, unseen black", psnr(seen, np.nan_to_num(raw))),
-            ("albedo on measured elements only", psnr(seen, albedo.rho, measured)),
-            ("albedo on elements with six or more clean observations", psnr(seen, albedo.rho, good)),
-            ("the truth itself through the texels (limit of the sampling)", psnr(seen, limit)),
+            ("Base Color as written", psnr(held_out, base)),
+            ("without the compensation for Principled's layering", psnr(held_out, albedo.rho)),
+            ("that, and glossy things lighting by their median", psnr(held_out, medians)),
+            (
+                "... and the specular part left in the median",
+                psnr(held_out, recovery.albedo_under(shading.irradiance).rho),
+            ),
+            ("plain quotient: neither filled in nor shrunk, unseen black", psnr(held_out, np.nan_to_num(raw))),
+            ("albedo on measured elements only", psnr(held_out, albedo.rho, measured)),
+            ("albedo on elements with six or more clean observations", psnr(held_out, albedo.rho, good)),
+            ("the truth itself through the texels (limit of the sampling)", psnr(held_out, limit)),
         )
     for name, value in rows:
         sys.stdout.write(f"{value:6.2f} dB  {name}\n")

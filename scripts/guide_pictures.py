@@ -6,7 +6,7 @@ CAPTURE is dragged in under its own path, which the pictures show. The home fold
 the files recovered.blend, relit.blend and room.blend, is temporary unless given. Whole pictures go to build/guide,
 those of docs/guide.md, cut to what the text speaks of, to docs/images/guide. The count of what the hand did is printed.
 
-Only two things differ from what a reader does: buttons are looked for in Solid shading, as the search moves the mouse
+Only two steps differ from what a reader does: buttons are looked for in Solid shading, as the search moves the mouse
 over every one of them, and a picture is taken once the Rendered viewport has had time.
 """
 

@@ -45,7 +45,7 @@ def halved(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> tu
 
 
 def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int) -> None:
-    told = json.loads((source / "transforms.json").read_text())
+    transforms = json.loads((source / "transforms.json").read_text())
     (out / "images").mkdir(parents=True)
     shutil.copy(source / "info_semantic.json", out)
     mesh = read_ply(source / "mesh.ply")
@@ -54,28 +54,32 @@ def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublin
         parts = halved(*parts)
     (out / "mesh.ply").write_bytes(ply_bytes(parts[0], [(parts[1], parts[2])]))
     rng = np.random.default_rng(0)
-    old = np.array([told["w"], told["h"]])
-    focal, centre = np.array([told["fl_x"], told["fl_y"]]), np.array([told["cx"], told["cy"]])
+    old = np.array([transforms["w"], transforms["h"]])
+    focal, centre = np.array([transforms["fl_x"], transforms["fl_y"]]), np.array([transforms["cx"], transforms["cy"]])
     jobs = []
     for number in range(frames):
-        one = told["frames"][number % len(told["frames"])]
+        frame = transforms["frames"][number % len(transforms["frames"])]
         share = rng.uniform(*SHARES)
         corner = rng.uniform(0, 1, 2) * (1 - share) * old
-        jobs.append((number, one, corner, share * old / size))
+        jobs.append((number, frame, corner, share * old / size))
 
     def make(job) -> dict:
-        number, one, corner, step = job
+        number, frame, corner, step = job
         name = f"images/frame_{number:05d}.exr"
-        image = np.asarray(read_exr(source / one["file_path"]).rgb, np.float32)
+        image = np.asarray(read_exr(source / frame["file_path"]).rgb, np.float32)
         write_exr(out / name, window(image, corner, step, size), half=True)
         (fl_x, fl_y), (cx, cy) = focal / step, (centre - corner) / step
         lens = {"fl_x": fl_x, "fl_y": fl_y, "cx": cx, "cy": cy}
-        return {"file_path": name, "transform_matrix": one["transform_matrix"], **lens}
+        return {"file_path": name, "transform_matrix": frame["transform_matrix"], **lens}
 
     with ThreadPoolExecutor() as pool:
         entries = list(pool.map(make, jobs))
-    kept = {name: value for name, value in told.items() if name not in ("frames", "w", "h", "fl_x", "fl_y", "cx", "cy")}
-    new = kept | {"w": size[0], "h": size[1], "frames": entries}
+    shared = {
+        name: value
+        for name, value in transforms.items()
+        if name not in ("frames", "w", "h", "fl_x", "fl_y", "cx", "cy")
+    }
+    new = shared | {"w": size[0], "h": size[1], "frames": entries}
     (out / "transforms.json").write_text(json.dumps(new, indent=1))
 
 
@@ -86,8 +90,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=500)
     parser.add_argument("--size", type=int, nargs=2, default=(1152, 768), metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--doublings", type=int, default=0, help="times that the number of triangles is doubled")
-    told = parser.parse_args()
-    enlarge(told.capture, told.out, told.frames, tuple(told.size), told.doublings)
+    options = parser.parse_args()
+    enlarge(options.capture, options.out, options.frames, tuple(options.size), options.doublings)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def write_pages(docs: Path, out: Path) -> None:
     out.mkdir(parents=True)
     names = sorted(docs.glob("*.md"))
     links = " &middot; ".join(
-        f'<a href="{one.stem}.html">{one.stem.replace("_", " ").replace("-", " ")}</a>' for one in names
+        f'<a href="{name.stem}.html">{name.stem.replace("_", " ").replace("-", " ")}</a>' for name in names
     )
     for path in names:
         body = page(path.read_text(encoding="utf-8"))
@@ -36,45 +36,45 @@ def write_pages(docs: Path, out: Path) -> None:
             encoding="utf-8",
         )
     for path in (*docs.rglob("*.png"), *docs.rglob("*.jpg")):
-        place = path.relative_to(docs)
-        if place.parts[0] not in LEFT_OUT:
-            (out / place).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, out / place)
+        relative = path.relative_to(docs)
+        if relative.parts[0] not in LEFT_OUT:
+            (out / relative).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, out / relative)
 
 
 def page(text: str) -> str:
-    found, lines = [], text.splitlines()
+    blocks, lines = [], text.splitlines()
     at = 0
     while at < len(lines):
         line, begin = lines[at], at
         if line.startswith("```"):
             at = next((k for k in range(at + 1, len(lines)) if lines[k].startswith("```")), len(lines)) + 1
-            found.append(f"<pre>{html.escape(chr(10).join(lines[begin + 1 : at - 1]))}</pre>")
+            blocks.append(f"<pre>{html.escape(chr(10).join(lines[begin + 1 : at - 1]))}</pre>")
         elif line.startswith("    "):
             while at < len(lines) and (lines[at].startswith("    ") or not lines[at].strip()):
                 at += 1
-            found.append(f"<pre>{html.escape(chr(10).join(one[4:] for one in lines[begin:at]).rstrip())}</pre>")
+            blocks.append(f"<pre>{html.escape(chr(10).join(row[4:] for row in lines[begin:at]).rstrip())}</pre>")
         elif heading := re.match(r"(#+) (.*)", line):
             level = len(heading[1])
-            found.append(f'<h{level} id="{anchor(heading[2])}">{inline(heading[2])}</h{level}>')
+            blocks.append(f'<h{level} id="{anchor(heading[2])}">{inline(heading[2])}</h{level}>')
             at += 1
         elif line.startswith("|"):
             while at < len(lines) and lines[at].startswith("|"):
                 at += 1
-            found.append(table(lines[begin:at]))
+            blocks.append(table(lines[begin:at]))
         elif item := re.match(r"(-|\d+\.) ", line):
             while at < len(lines) and lines[at].strip():
                 at += 1
             kind = "ul" if item[1] == "-" else "ol"
             items = re.split(r"\n(?:-|\d+\.) +", "\n" + "\n".join(lines[begin:at]))[1:]
-            found.append(f"<{kind}>{''.join(f'<li>{inline(one)}</li>' for one in items)}</{kind}>")
+            blocks.append(f"<{kind}>{''.join(f'<li>{inline(entry)}</li>' for entry in items)}</{kind}>")
         elif line.strip():
             while at < len(lines) and lines[at].strip() and not lines[at].startswith(("#", "|", "```")):
                 at += 1
-            found.append(f"<p>{inline(chr(10).join(lines[begin:at]))}</p>")
+            blocks.append(f"<p>{inline(chr(10).join(lines[begin:at]))}</p>")
         else:
             at += 1
-    return "\n".join(found)
+    return "\n".join(blocks)
 
 
 def table(lines: list[str]) -> str:
@@ -87,7 +87,7 @@ def table(lines: list[str]) -> str:
 
 
 def inline(text: str) -> str:
-    """What stands within a paragraph."""
+    """The markup within a paragraph, as HTML."""
     code: list[str] = []
 
     def keep(match):

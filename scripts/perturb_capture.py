@@ -53,11 +53,11 @@ def perturbed_pose(matrix: list, metres: float, radians: float, rng: np.random.G
 
 def offsets(points: np.ndarray, metres: float, share: float, rng: np.random.Generator) -> np.ndarray:
     """How far each of the points ((p, 3)) moves along its normal, (p,): `share` of the variance is smooth."""
-    way = rng.normal(size=(WAVES, 3))
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    way *= 2 * np.pi / np.exp(rng.uniform(np.log(SHORTEST), np.log(LONGEST), (WAVES, 1)))
+    wave_vectors = rng.normal(size=(WAVES, 3))
+    wave_vectors /= np.linalg.norm(wave_vectors, axis=1, keepdims=True)
+    wave_vectors *= 2 * np.pi / np.exp(rng.uniform(np.log(SHORTEST), np.log(LONGEST), (WAVES, 1)))
     phase = rng.uniform(0, 2 * np.pi, WAVES)
-    smooth = sum(np.cos(points @ k + p) for k, p in zip(way, phase)) * np.sqrt(2 / WAVES)
+    smooth = sum(np.cos(points @ k + p) for k, p in zip(wave_vectors, phase)) * np.sqrt(2 / WAVES)
     return metres * (np.sqrt(share) * smooth + np.sqrt(1 - share) * rng.normal(size=len(points)))
 
 
@@ -70,10 +70,10 @@ def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: n
         raise SystemExit(f"'{source}' does not begin with its vertices.")
     ply = read_ply(source)
     vertices, triangles = np.asarray(ply.vertices, np.float64), np.asarray(ply.triangles)
-    first, place = same_place(vertices, SEAM)
-    normal = point_normals(vertices[first], place[triangles])
-    moved = vertices + (normal * offsets(vertices[first], metres, share, rng)[:, None])[place]
-    at = [next(i for i, p in enumerate(head.properties) if p.name == name) for name in "xyz"]
+    first, point_index = same_place(vertices, SEAM)
+    normal = point_normals(vertices[first], point_index[triangles])
+    moved = vertices + (normal * offsets(vertices[first], metres, share, rng)[:, None])[point_index]
+    columns = [next(i for i, p in enumerate(head.properties) if p.name == name) for name in "xyz"]
     if order:
         kind = np.dtype([(p.name, order + p.kind) for p in head.properties])
         records = np.frombuffer(content, kind, head.count, start)  # a view: what is written goes into `content`
@@ -83,7 +83,7 @@ def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: n
         lines = content[start:].decode("latin-1").splitlines()
         for i, point in enumerate(moved.tolist()):
             words = lines[i].split()
-            for k, value in zip(at, point):
+            for k, value in zip(columns, point):
                 words[k] = repr(value)
             lines[i] = " ".join(words)
         content[start:] = ("\n".join(lines) + "\n").encode("latin-1")

@@ -29,27 +29,27 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        shown = []
+        pictures = []
         for number, blend in enumerate(options.blends):
             scene = open_scene(blend, options.frame.stem, options.samples)
             if number == 0:
-                shown.append(as_shown(options.frame.absolute(), scene, Path(folder) / "photograph.png"))
+                pictures.append(as_shown(options.frame.absolute(), scene, Path(folder) / "photograph.png"))
             render = Path(folder) / f"{number}.exr"
             scene.render.filepath = str(render)
             bpy.ops.render.render(write_still=True, scene=scene.name)
-            shown.append(as_shown(render, scene, render.with_suffix(".png")))
-        print(f"PSNR between scene.blend and the window's scene: {decibels(shown[1], shown[2]):.1f} dB")
-        print(f"PSNR between the photograph and scene.blend: {decibels(shown[0], shown[1]):.1f} dB")
-    join(shown).save(options.out, quality=90, subsampling=0, optimize=True)
+            pictures.append(as_shown(render, scene, render.with_suffix(".png")))
+        print(f"PSNR between scene.blend and the window's scene: {decibels(pictures[1], pictures[2]):.1f} dB")
+        print(f"PSNR between the photograph and scene.blend: {decibels(pictures[0], pictures[1]):.1f} dB")
+    join(pictures).save(options.out, quality=90, subsampling=0, optimize=True)
     return 0
 
 
 def open_scene(blend: Path, frame: str, samples: int) -> bpy.types.Scene:
     """The room's scene of a file, ready to render through a frame's camera."""
     bpy.ops.wm.open_mainfile(filepath=str(blend.absolute()), load_ui=False)
-    scene = next(one for one in bpy.data.scenes if one.get("scan_relight_own"))
+    scene = next(candidate for candidate in bpy.data.scenes if candidate.get("scan_relight_own"))
     scene.camera = next(
-        one for one in scene.objects if one.type == "CAMERA" and Path(one.get("frame_path", "")).stem == frame
+        obj for obj in scene.objects if obj.type == "CAMERA" and Path(obj.get("frame_path", "")).stem == frame
     )
     width, height = scene.camera["width"], scene.camera["height"]
     render, cycles = scene.render, scene.cycles
@@ -73,15 +73,15 @@ def as_shown(picture: Path, scene: bpy.types.Scene, out: Path) -> np.ndarray:
     settings.file_format, settings.color_depth = "PNG", "8"
     image.save_render(str(out), scene=scene)
     settings.file_format, settings.color_depth = "OPEN_EXR", "32"
-    with Image.open(out) as shown:
-        shown = shown.convert("RGB")
-        size = WIDTH, round(WIDTH * shown.height / shown.width)
-        return np.asarray(shown.resize(size, Image.Resampling.LANCZOS) if shown.size != size else shown)
+    with Image.open(out) as displayed:
+        displayed = displayed.convert("RGB")
+        size = WIDTH, round(WIDTH * displayed.height / displayed.width)
+        return np.asarray(displayed.resize(size, Image.Resampling.LANCZOS) if displayed.size != size else displayed)
 
 
-def decibels(one: np.ndarray, other: np.ndarray) -> float:
+def decibels(first: np.ndarray, second: np.ndarray) -> float:
     """PSNR of two pictures as a screen shows them."""
-    return float(-10 * np.log10(max(np.mean((one / 255 - other / 255) ** 2), 1e-12)))
+    return float(-10 * np.log10(max(np.mean((first / 255 - second / 255) ** 2), 1e-12)))
 
 
 def join(pictures: list[np.ndarray]) -> Image.Image:

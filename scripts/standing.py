@@ -52,17 +52,17 @@ What is not measured: real captures with truth; more than two seeds of a perturb
 
 
 def line_of(scores: dict, report: dict, capture: str, views: int, spp: int) -> dict:
-    """One measurement, of what the scoring script and the run told."""
+    """One measurement, from the scoring script's scores and the run's report."""
     albedo, roughness = scores["albedo"], scores["roughness"]
     phone = report.get("tier") == "codes"
-    shown = "psnr_one_exposure" if phone else "psnr"
-    relight = [one[shown] for name, one in scores.items() if name.startswith("relight")]
+    metric = "psnr_one_exposure" if phone else "psnr"
+    relight = [score[metric] for name, score in scores.items() if name.startswith("relight")]
     return {
         "capture": capture,
         "albedo": [round(albedo[f"psnr{which}"], 1) for which in ("", "_one_scale", "_three_scales")],
         "roughness": [_rounded(roughness[f"mean_abs_error_by_{which}"], 3) for which in ("pixel", "object")],
         "models": [scores["model"]["right_by_majority" if phone else "right"], scores["model"]["of"]],
-        "re-render": round(scores["rerender"][shown], 1),
+        "re-render": round(scores["rerender"][metric], 1),
         "relight": round(sum(relight) / len(relight), 1) if relight else None,
         "seconds": round(report["seconds"], 1),
         "memory_gib": _rounded(report["peak_memory_bytes"] and report["peak_memory_bytes"] / 2**30, 2),
@@ -84,18 +84,18 @@ def page(lines: list[dict]) -> str:
 
 
 def _cells(line: dict) -> list[str]:
-    def told(value, unit: str = "") -> str:
+    def text(value, unit: str = "") -> str:
         return "-" if value is None else f"{value}{unit}"
 
     return [
         line["capture"],
-        " / ".join(told(value) for value in line["albedo"]) + " dB",
-        " / ".join(told(value) for value in line["roughness"]),
+        " / ".join(text(value) for value in line["albedo"]) + " dB",
+        " / ".join(text(value) for value in line["roughness"]),
         "{} of {}".format(*line["models"]),
-        told(line["re-render"], " dB"),
-        told(line["relight"], " dB"),
-        told(line["seconds"], " s"),
-        told(line["memory_gib"], " GiB"),
+        text(line["re-render"], " dB"),
+        text(line["relight"], " dB"),
+        text(line["seconds"], " s"),
+        text(line["memory_gib"], " GiB"),
         f"{line['views']}, {line['spp']} samples",
         f"{line['date']}, {line['commit']}",
     ]

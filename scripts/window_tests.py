@@ -45,20 +45,20 @@ def running_inside() -> bool:
 
 def find_blender() -> tuple[str | None, str]:
     """The executable, or None and the reason."""
-    found = os.environ.get("BLENDER") or shutil.which("blender")
-    if found:
-        return (found, "") if shutil.which(found) else (None, f"BLENDER names '{found}', which can't be run")
+    blender = os.environ.get("BLENDER") or shutil.which("blender")
+    if blender:
+        return (blender, "") if shutil.which(blender) else (None, f"BLENDER names '{blender}', which can't be run")
     if sys.platform != "linux":
         return None, "set BLENDER to Blender's executable"
     print("There is no Blender on the PATH; making one (four minutes the first time) ...", file=sys.stderr, flush=True)
     try:
-        made = subprocess.run([ROOT / "scripts" / "make_blender.sh"], capture_output=True, text=True, timeout=MAKING)
+        result = subprocess.run([ROOT / "scripts" / "make_blender.sh"], capture_output=True, text=True, timeout=MAKING)
     except subprocess.TimeoutExpired:
         return None, f"making a Blender took more than {MAKING} s"
-    if made.returncode:
-        said = made.stderr.strip().splitlines() or ["it left no word"]
-        return None, f"no Blender could be made ({said[-1]})"
-    return made.stdout.strip().splitlines()[-1], ""
+    if result.returncode:
+        errors = result.stderr.strip().splitlines() or ["it left no word"]
+        return None, f"no Blender could be made ({errors[-1]})"
+    return result.stdout.strip().splitlines()[-1], ""
 
 
 if __name__ == "__main__":

@@ -87,7 +87,7 @@ def bedroom(seed: int) -> FurnishedRoom:
             Finish(frame.albedo),
             Finish(painting()),
         )
-        r.things[-1].slot[1] = 1
+        r.objects[-1].slot[1] = 1
         bars = [box((left - 0.03, y - 0.045, h), (left + 0.63, y - 0.002, h + 0.03)) for h in (1.47, 2.0)]
         bars += [box((a, y - 0.045, 1.5), (a + 0.03, y - 0.002, 2.0)) for a in (left - 0.03, left + 0.6)]
         r.add("picture frame", bars, frame)
@@ -115,7 +115,7 @@ def office(seed: int) -> FurnishedRoom:
         a, b = 1.0 + 1.8 * (k % 3), 0.9 + 1.9 * (k // 3)
         r.add("light panel", [box((a, b, z - 0.03), (a + 0.3, b + 1.0, z - 0.005))], r.lamp(9.5, 10.5, 11))
         if k == 4:
-            panel = r.things.pop()  # one tube is dead
+            panel = r.objects.pop()  # one tube is dead
             r.add("light panel", [(panel.quads, panel.uv)], r.diffuse(0.7, 0.7, 0.7))
     top = r.gloss(0.35, wood((0.55, 0.42, 0.27), 5, seed))
     black = r.gloss(0.3, (0.018, 0.018, 0.02))
@@ -203,7 +203,7 @@ def office(seed: int) -> FurnishedRoom:
         [turned((0, 0, 0), [(0.16, 0), (0.16, 0.03), (0.15, 0.035), (0.002, 0.03)], 28)],
         r.gloss(0.2, (0.75, 0.75, 0.72)),
     )
-    clock = r.things[-1]
+    clock = r.objects[-1]
     clock.quads[:] = clock.quads[..., [2, 0, 1]] + (0.002, 2.1, 2.2)
     return r
 
@@ -260,7 +260,7 @@ def hall(seed: int) -> FurnishedRoom:
             r.gloss(0.2 + 0.15 * k, c),
         )
     r.add("picture", [box((1.3, 0.002, 1.3), (2.5, 0.03, 2.2))], Finish(np.float32([0.03] * 3)), Finish(painting()))
-    r.things[-1].slot[3] = 1
+    r.objects[-1].slot[3] = 1
     r.add_round("bench", [cushion((2.3, 4.6, 0.42), (0.6, 0.22, 0.06), 10, 0.3)], r.diffuse(0.06, 0.16, 0.12))
     r.add_round(
         "bench legs",

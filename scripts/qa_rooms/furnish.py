@@ -1,10 +1,10 @@
-"""A room under construction: things are added one by one, in colours and gloss that the seed changes a little."""
+"""A room under construction: objects are added one by one, in colours and gloss that the seed varies a little."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from addon.bridge.demo.room import Paint, Thing, box, grid
+from addon.bridge.demo.room import Paint, RoomObject, box, grid
 
 from .shapes import tube, wall
 
@@ -44,7 +44,7 @@ class FurnishedRoom:
     ground: tuple[float, float, float] = (0, 0, 0)
     sun: tuple | None = None
     windows: list = field(default_factory=list)
-    things: list[Thing] = field(default_factory=list)
+    objects: list[RoomObject] = field(default_factory=list)
 
     def __post_init__(self):
         self.rng = np.random.default_rng([self.seed, sum(map(ord, self.name))])
@@ -53,14 +53,14 @@ class FurnishedRoom:
         """One more object."""
         quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
         slot = np.repeat([0] * len(shapes) if slots is None else slots, [len(s[0]) for s in shapes])
-        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, triangles))
+        self.objects.append(RoomObject(len(self.objects), class_name, quads, uv, slot, finishes, triangles))
 
     def add_round(self, class_name: str, shapes, finish: Finish) -> None:
         """One more object that is shaded smooth, its quads split in triangles."""
         self.add(class_name, shapes, finish, triangles=True)
 
     def tint(self, colour, spread: float = 0.12) -> np.ndarray:
-        """The colour a little changed by the seed."""
+        """The colour, varied a little by the seed."""
         return np.clip(np.asarray(colour) * self.rng.uniform(1 - spread, 1 + spread, 3), 0.005, 0.92)
 
     def diffuse(self, *colour) -> Finish:
@@ -81,7 +81,7 @@ class FurnishedRoom:
         return Finish(np.float32(colour), roughness, 0.5, metallic=True)
 
     def lamp(self, *radiance) -> Finish:
-        """What shines."""
+        """A lamp of that radiance, varied a little by the seed."""
         return Finish(
             np.zeros(3, np.float32), emission=tuple(float(r * self.rng.uniform(0.85, 1.15)) for r in radiance)
         )

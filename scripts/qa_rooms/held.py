@@ -1,4 +1,4 @@
-"""Shares of the truth that a result's 90 % intervals hold, in the room's held-out views."""
+"""Coverage of a result's 90 % intervals, in the room's held-out views."""
 
 import numpy as np
 
@@ -6,18 +6,18 @@ from addon.core.brdf.material import Z90
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
 
-LEAST_POINTS = 2
-"""In the views, that an element is known from."""
-LEAST_ELEMENTS = 20
-"""Known and measured ones, that an object's mean is judged by."""
+MIN_POINTS = 2
+"""Pixels of the views from which on an element's true albedo is known."""
+MIN_ELEMENTS = 20
+"""Known and measured elements from which on an object's mean is judged."""
 
 
-def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[str, float]:
+def held(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> dict[str, float]:
     """By area: of Base Color's elements, measured and filled in; of objects' means; of roughnesses.
 
     Parameters
     ----------
-    seen : list of dict
+    held_out : list of dict
         `truth_views.views` of the room.
     truth : dict
         Of `truth/materials.json`, by object_id.
@@ -25,20 +25,20 @@ def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[s
     atlas, albedo, evidence = recovery.surface().atlas, recovery.albedo, recovery.evidence
     materials = {m.object_id: m for m in recovery.materials()}
     base = recovery.base_color()
-    true = projected_truth(seen, len(atlas), np.full_like(base, np.nan))
-    points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in seen)
+    true = projected_truth(held_out, len(atlas), np.full_like(base, np.nan))
+    points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in held_out)
     plain = [i for i, m in materials.items() if m.model.has_albedo]
-    known = np.isfinite(true).all(1) & (points >= LEAST_POINTS) & np.isin(atlas.object_id, plain)
+    known = np.isfinite(true).all(1) & (points >= MIN_POINTS) & np.isin(atlas.object_id, plain)
     # The errors are those of the diffuse albedo, Base Color is more by what the specular layer takes.
     scale = np.maximum(base / np.maximum(albedo.rho, 1e-3), 1)
     within = (np.abs(base - true) <= Z90 * scale * evidence.texels.albedo + 1e-6).mean(1)
     measured = albedo.origin == MEASURED
     means = []
-    for one in evidence.objects:
-        own = known & measured & (atlas.object_id == one.object_id)
-        if own.sum() >= LEAST_ELEMENTS and one.albedo_low is not None:
-            mean, more = (np.average(x[own], 0, atlas.area[own]) for x in (true, scale))
-            low, high = np.array(one.albedo_low) * more, np.array(one.albedo_high) * more
+    for entry in evidence.objects:
+        elements = known & measured & (atlas.object_id == entry.object_id)
+        if elements.sum() >= MIN_ELEMENTS and entry.albedo_low is not None:
+            mean, mean_scale = (np.average(x[elements], 0, atlas.area[elements]) for x in (true, scale))
+            low, high = np.array(entry.albedo_low) * mean_scale, np.array(entry.albedo_high) * mean_scale
             means.append(((low <= mean) & (mean <= high)).mean())
     rough = [
         m.roughness_low <= np.sqrt(truth[i]["alpha"]) <= m.roughness_high
@@ -58,10 +58,10 @@ def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[s
     }
 
 
-def projected_truth(seen: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
+def projected_truth(held_out: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
     """The truth as elements could hold it at best: the mean of what the held-out views themselves show of each."""
     total, hits = np.zeros((count, 3)), np.zeros(count)
-    for view in seen:
+    for view in held_out:
         for element in view["element"]:
             ok = view["counts"]
             for c in range(3):

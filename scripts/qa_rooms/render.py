@@ -23,11 +23,11 @@ RELIT = ("A", (0.25, 60.0, 45.0, 30.0))
 
 
 TOO_NEW = (5, 0)
-"""Blender from which on a multilayer file of the module holds the combined pass alone (seen in 5.2)."""
+"""Blender from which on the Python module writes the combined pass alone to a multilayer file (observed in 5.2)."""
 
 
 def walk(room: FurnishedRoom, count: int, phase: float, scene: RayScene) -> np.ndarray:
-    """Poses (count, 4, 4) of a person who strolls about and looks around; turned away from what is too near."""
+    """Poses (count, 4, 4) of a camera that walks about and looks around; turned away from near surfaces."""
     x0, y0, x1, y1 = room.walk
     low, high = np.radians(room.pitch)
     poses = []
@@ -45,8 +45,8 @@ def walk(room: FurnishedRoom, count: int, phase: float, scene: RayScene) -> np.n
             gaze = yaw + turn * 0.55
             pose = look_at(eye, eye + (np.cos(gaze) * np.cos(tilt), np.sin(gaze) * np.cos(tilt), np.sin(tilt)))
             camera = Camera(16, 12, 8 / np.tan(FIELD_OF_VIEW / 2), 8 / np.tan(FIELD_OF_VIEW / 2), 8, 6, pose)
-            ways = camera.directions(camera.pixel_centres())
-            hits = scene.intersect(np.broadcast_to(eye.astype(np.float32), ways.shape), ways)
+            directions = camera.directions(camera.pixel_centres())
+            hits = scene.intersect(np.broadcast_to(eye.astype(np.float32), directions.shape), directions)
             depth = np.where(hits.triangle >= 0, hits.distance, 10.0)
             if depth.min() > 0.3 and np.median(depth) > 1.0:
                 break
@@ -56,42 +56,42 @@ def walk(room: FurnishedRoom, count: int, phase: float, scene: RayScene) -> np.n
 
 def objects_seen(camera: Camera, object_id: np.ndarray, scene: RayScene) -> np.ndarray:
     """Object at each pixel's centre, (h, w) int; -1 where none is."""
-    ways = camera.directions(camera.pixel_centres())
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), ways.shape), ways)
-    found = np.where(hits.triangle >= 0, object_id[np.maximum(hits.triangle, 0)], -1)
-    return found.reshape(camera.height, camera.width)
+    directions = camera.directions(camera.pixel_centres())
+    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    ids = np.where(hits.triangle >= 0, object_id[np.maximum(hits.triangle, 0)], -1)
+    return ids.reshape(camera.height, camera.width)
 
 
 def truth_of(room: FurnishedRoom) -> list[dict]:
-    """What is true of each object, as truth/materials.json has it."""
+    """The true values of each object, as in truth/materials.json."""
     rows = []
-    for thing in room.things:
-        paint = thing.paints[0]
+    for obj in room.objects:
+        paint = obj.paints[0]
         glass, metal = paint.glass, paint.metallic
         kind = "diffuse" if not paint.f0 else "dielectric" if glass else "roughconductor" if metal else "roughplastic"
         rows.append({
-            "id": thing.object_id, "class_name": thing.class_name, "bsdf": kind,
+            "id": obj.object_id, "class_name": obj.class_name, "bsdf": kind,
             "emission": None if paint.emission is None else list(paint.emission),
             "alpha": paint.roughness**2 if paint.f0 and not glass else None,
             "f0": None if metal else paint.f0, "metallic": float(metal), "masked": glass, "base_factor": 1.0,
-            "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
+            "base_color": [round(float(c), 4) for c in obj.mean_albedo()],
         })  # fmt: skip
     return rows
 
 
 def build(room: FurnishedRoom, scene) -> None:
-    """All things, the sky and the sun in the Blender scene."""
-    for thing in room.things:
-        made = demo_render.build(thing)
-        scene.collection.objects.link(made)
-        for paint, material in zip(thing.paints, made.data.materials):
+    """Add all objects, the sky and the sun to the Blender scene."""
+    for obj in room.objects:
+        mesh_object = demo_render.build(obj)
+        scene.collection.objects.link(mesh_object)
+        for paint, material in zip(obj.paints, mesh_object.data.materials):
             if paint.metallic:
                 principled(material).inputs[METALLIC].default_value = 1.0
             if paint.glass:
                 _clear(material)
-        if thing.triangles:
-            made.data.shade_smooth()
-            made.data.set_sharp_from_angle(angle=np.radians(40))
+        if obj.triangles:
+            mesh_object.data.shade_smooth()
+            mesh_object.data.set_sharp_from_angle(angle=np.radians(40))
     if any(room.sky):
         scene.world = _sky(room)
         for origin, across, up in room.windows:
@@ -113,9 +113,9 @@ def build(room: FurnishedRoom, scene) -> None:
 
 
 def _link(scene, data, pose) -> None:
-    thing = bpy.data.objects.new(data.name, data)
-    thing.matrix_world = Matrix(np.asarray(pose).tolist())
-    scene.collection.objects.link(thing)
+    obj = bpy.data.objects.new(data.name, data)
+    obj.matrix_world = Matrix(np.asarray(pose).tolist())
+    scene.collection.objects.link(obj)
 
 
 def _clear(material) -> None:
@@ -131,8 +131,8 @@ def _sky(room: FurnishedRoom):
     """A world that is bright above the horizon, brightest near it, and earthy below."""
     world = bpy.data.worlds.new("sky")
     tree, top = fresh_tree(world), max(room.sky)
-    place = add_node(tree, "ShaderNodeTexCoord")
-    split = add_node(tree, "ShaderNodeSeparateXYZ", place.outputs["Generated"])
+    coordinates = add_node(tree, "ShaderNodeTexCoord")
+    split = add_node(tree, "ShaderNodeSeparateXYZ", coordinates.outputs["Generated"])
     height = add_node(tree, "ShaderNodeMath", split.outputs["Z"], 0.5, 0.5, operation="MULTIPLY_ADD")
     ramp = add_node(tree, "ShaderNodeValToRGB", height.outputs[0])
     stops = ramp.color_ramp.elements
@@ -160,9 +160,9 @@ def _override(scene) -> None:
 def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
     """All lights off but one new one, which shines on one side."""
     scene.world = None
-    for thing in list(scene.collection.objects):
-        if thing.type == "LIGHT":
-            bpy.data.objects.remove(thing)
+    for obj in list(scene.collection.objects):
+        if obj.type == "LIGHT":
+            bpy.data.objects.remove(obj)
     for material in bpy.data.materials:
         for node in material.node_tree.nodes:
             if node.type == "EMISSION":
@@ -203,11 +203,13 @@ def render(
     bpy.ops.wm.read_factory_settings(use_empty=True)
     vertices, triangles, object_id = _triangles(room)
     rays = RayScene(vertices, triangles)
-    poses, held = walk(room, frames, 0.0, rays), walk(room, held_out, 0.43, rays)
-    write_all_but_frames(folder, room.things, poses, size)
+    poses, held_poses = walk(room, frames, 0.0, rays), walk(room, held_out, 0.43, rays)
+    write_all_but_frames(folder, room.objects, poses, size)
     truth = folder / "truth"
     (truth / "materials.json").write_text(json.dumps(truth_of(room), indent=1))
-    views = [{"file_path": f"image/view_{k:03d}.exr", "transform_matrix": pose.tolist()} for k, pose in enumerate(held)]
+    views = [
+        {"file_path": f"image/view_{k:03d}.exr", "transform_matrix": pose.tolist()} for k, pose in enumerate(held_poses)
+    ]
     lens = json.loads((folder / "transforms.json").read_text())
     (truth / "transforms.json").write_text(json.dumps(lens | {"frames": views}, indent=1))
     scene = bpy.context.scene
@@ -227,7 +229,7 @@ def render(
     image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
     for name in ("image", "albedo", "object_id", "diffuse_light", "diffuse_color", f"relight_{RELIT[0]}"):
         (truth / name).mkdir()
-    for k, pose in enumerate(held):
+    for k, pose in enumerate(held_poses):
         name = f"view_{k:03d}.exr"
         shoot(pose, truth / "all.exr")
         planes = OpenEXR.File(str(truth / "all.exr"), separate_channels=True).channels()
@@ -244,26 +246,28 @@ def render(
         write_exr(truth / "object_id" / name, ids)
     (truth / "all.exr").unlink()
     image.file_format = "OPEN_EXR"
-    lit = np.diag([RELIT[1][0], -RELIT[1][0], -1.0, 1.0])
+    light_pose = np.diag([RELIT[1][0], -RELIT[1][0], -1.0, 1.0])
     x0, y0, x1, y1 = room.walk
-    lit[:3, 3] = (x0 + 0.25 * (x1 - x0), (y0 + y1) / 2, room.size[2] - 0.35)
+    light_pose[:3, 3] = (x0 + 0.25 * (x1 - x0), (y0 + y1) / 2, room.size[2] - 0.35)
     (truth / "relight.json").write_text(
-        json.dumps({RELIT[0]: {"rectangle_to_world_z_up": lit.tolist(), "radiance": list(RELIT[1][1:])}}, indent=1)
+        json.dumps(
+            {RELIT[0]: {"rectangle_to_world_z_up": light_pose.tolist(), "radiance": list(RELIT[1][1:])}}, indent=1
+        )
     )
-    _relight(scene, room, lit)
-    for k, pose in enumerate(held[: max(1, held_out // 3)]):
+    _relight(scene, room, light_pose)
+    for k, pose in enumerate(held_poses[: max(1, held_out // 3)]):
         shoot(pose, truth / f"relight_{RELIT[0]}" / f"view_{k:03d}.exr")
     bpy.data.objects.remove(scene.collection.objects["light"])
     _override(scene)
     scene.cycles.samples, scene.cycles.use_denoising = 16, False
-    for k, pose in enumerate(held):
+    for k, pose in enumerate(held_poses):
         shoot(pose, truth / "albedo" / f"view_{k:03d}.exr")
 
 
 def _triangles(room: FurnishedRoom) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The room's vertices (v, 3), triangles (t, 3) and the triangles' objects (t,)."""
-    quads = np.concatenate([thing.quads for thing in room.things])
+    quads = np.concatenate([obj.quads for obj in room.objects])
     first = 4 * np.arange(len(quads))[:, None, None]
     triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
-    ids = np.repeat([thing.object_id for thing in room.things], [2 * len(thing.quads) for thing in room.things])
+    ids = np.repeat([obj.object_id for obj in room.objects], [2 * len(obj.quads) for obj in room.objects])
     return quads.reshape(-1, 3).astype(np.float32), triangles.astype(np.int32), ids

@@ -4,4 +4,4 @@ from .dry_rooms import bedroom, hall, office
 from .study import study
 from .wet_rooms import bathroom, kitchen
 
-ROOMS = {one.__name__: one for one in (kitchen, bathroom, bedroom, office, hall, study)}
+ROOMS = {make.__name__: make for make in (kitchen, bathroom, bedroom, office, hall, study)}

@@ -29,11 +29,11 @@ def tube(path, radius: float, steps: int = 10) -> Shape:
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     side = np.cross(along[0], (0.31, 0.9, 0.3))
     rings = []
-    for place, ahead in zip(path, along):
+    for point, ahead in zip(path, along):
         side = side - ahead * (side @ ahead)
         side = side / np.linalg.norm(side)
         turn = np.linspace(0, 2 * np.pi, steps + 1)[:, None]
-        rings.append(place + radius * (np.cos(turn) * side + np.sin(turn) * np.cross(ahead, side)))
+        rings.append(point + radius * (np.cos(turn) * side + np.sin(turn) * np.cross(ahead, side)))
     return _patch(np.array(rings).transpose(1, 0, 2))
 
 
@@ -116,11 +116,11 @@ def tiles(colours, grout, columns: int, rows: int, seed: int, joint: float = 0.0
     return np.clip(picture, 0, 0.95).astype(np.float32)
 
 
-def checker(one, other, count: int, size: int = 256) -> np.ndarray:
+def checker(first, second, count: int, size: int = 256) -> np.ndarray:
     """A chessboard."""
     x, y = _xy(size)
     odd = ((x * count).astype(int) + (y * count).astype(int)) % 2
-    return np.where(odd[..., None], one, other).astype(np.float32)
+    return np.where(odd[..., None], first, second).astype(np.float32)
 
 
 def clouds(low, high, scale: float, seed: int, size: int = 256, sharp: float = 1.0) -> np.ndarray:

@@ -55,21 +55,21 @@ def test_the_truth_agrees_with_itself(office):
 def test_every_kind_has_metals_gloss_and_light():
     for make in ROOMS.values():
         room = make(3)
-        paints = [thing.paints[0] for thing in room.things]
+        paints = [thing.paints[0] for thing in room.objects]
         assert any(p.metallic for p in paints) and sum(bool(p.f0) and not p.metallic for p in paints) > 5
         assert any(p.emission for p in paints) or any(room.sky)
-        assert [thing.object_id for thing in room.things] == list(range(len(room.things)))
+        assert [thing.object_id for thing in room.objects] == list(range(len(room.objects)))
 
 
 def test_seeds_change_a_room():
     one, other = ROOMS["kitchen"](1), ROOMS["kitchen"](2)
-    assert not np.allclose(one.things[2].paints[0].albedo, other.things[2].paints[0].albedo)
+    assert not np.allclose(one.objects[2].paints[0].albedo, other.objects[2].paints[0].albedo)
 
 
 def test_a_ground_goes_on_around_the_room():
     room, plain = ROOMS["office"](1), ROOMS["office"](1)
     room.surround(100)
-    assert [thing.class_name for thing in room.things] == [*(thing.class_name for thing in plain.things), "ground"]
-    corners = room.things[-1].quads.reshape(-1, 3)
+    assert [thing.class_name for thing in room.objects] == [*(thing.class_name for thing in plain.objects), "ground"]
+    corners = room.objects[-1].quads.reshape(-1, 3)
     assert np.ptp(corners, axis=0)[:2] == pytest.approx([100 * max(room.size[:2])] * 2)
-    assert corners[:, 2].max() < min(thing.quads[..., 2].min() for thing in plain.things)
+    assert corners[:, 2].max() < min(thing.quads[..., 2].min() for thing in plain.objects)
