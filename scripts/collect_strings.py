@@ -49,11 +49,11 @@ def registered() -> set[str]:
     for cls in operators.classes():
         strings |= {getattr(cls, "bl_label", ""), getattr(cls, "bl_description", "")}
         if issubclass(cls, bpy.types.Operator):
-            known = getattr(bpy.ops.scan_relight, cls.bl_idname.partition(".")[2]).get_rna_type().properties
+            properties = getattr(bpy.ops.scan_relight, cls.bl_idname.partition(".")[2]).get_rna_type().properties
         else:
             annotated = {name for base in cls.__mro__ for name in getattr(base, "__annotations__", ())}
-            known = [prop for prop in cls.bl_rna.properties if prop.identifier in annotated]
-        for prop in known:
+            properties = [prop for prop in cls.bl_rna.properties if prop.identifier in annotated]
+        for prop in properties:
             if prop.identifier == "rna_type" or prop.is_hidden:
                 continue
             strings |= {prop.name, prop.description}

@@ -82,18 +82,18 @@ def main(argv: list[str]) -> int:
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*.py")):
             tree = ast.parse(path.read_text(encoding="utf-8"))
-            where = path.parent.relative_to(ROOT).as_posix()
+            parent = path.parent.relative_to(ROOT).as_posix()
             numbers = list(constants(tree))
             kinds.update(kind for _, kind in numbers if kind)
             chosen = [name for name, kind in numbers if not kind]
             for count, names in ((loose, chosen), (fields, list(params(tree))), (inline, sorted(set(in_code(tree))))):
-                count[where] += len(names)
+                count[parent] += len(names)
                 if show and names:
                     print(f"{path.relative_to(ROOT)}: {', '.join(names)}")
     print("loose Params in code")
-    for where in sorted(loose):
-        if loose[where] or fields[where]:
-            print(f"{loose[where]:5d} {fields[where]:6d} {inline[where]:7d}  {where}")
+    for parent in sorted(loose):
+        if loose[parent] or fields[parent]:
+            print(f"{loose[parent]:5d} {fields[parent]:6d} {inline[parent]:7d}  {parent}")
     print(f"{sum(loose.values()):5d} {sum(fields.values()):6d} {sum(inline.values()):7d}  together")
     print(f"Chosen: {sum(loose.values()) + sum(fields.values())}. Of a kind, not chosen by results:")
     print(", ".join(f"{kinds[kind]} {kind}" for kind in KINDS))

@@ -50,7 +50,7 @@ def main() -> int:
         raw, _ = quotient(np.maximum(lit.radiance - specular, 0), recovery.irradiance)
         medians = without_excess(recovery)
         measured = albedo.origin == MEASURED
-        good = measured & (lit.tier == 0) & (lit.count >= 6)
+        well_observed = measured & (lit.tier == 0) & (lit.count >= 6)
         limit = projected_truth(held_out, len(lit.count), albedo.rho)
         rows = (
             ("Base Color as written", psnr(held_out, base)),
@@ -62,7 +62,7 @@ def main() -> int:
             ),
             ("plain quotient: neither filled in nor shrunk, unseen black", psnr(held_out, np.nan_to_num(raw))),
             ("albedo on measured elements only", psnr(held_out, albedo.rho, measured)),
-            ("albedo on elements with six or more clean observations", psnr(held_out, albedo.rho, good)),
+            ("albedo on elements with six or more clean observations", psnr(held_out, albedo.rho, well_observed)),
             ("the truth itself through the texels (limit of the sampling)", psnr(held_out, limit)),
         )
     for name, value in rows:

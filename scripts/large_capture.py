@@ -31,17 +31,17 @@ SHARES = (0.7, 1.0)
 def window(image: np.ndarray, corner: np.ndarray, step: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """`size` (width, height) pixels from a corner (x, y) on, `step` (x, y) apart, in the image's pixels."""
     x, y = (corner[i] + (np.arange(size[i]) + 0.5) * step[i] - 0.5 for i in range(2))
-    at = np.meshgrid(y, x, indexing="ij")
-    return np.stack([map_coordinates(image[..., c], at, order=1, mode="nearest") for c in range(3)], -1)
+    coordinates = np.meshgrid(y, x, indexing="ij")
+    return np.stack([map_coordinates(image[..., c], coordinates, order=1, mode="nearest") for c in range(3)], -1)
 
 
 def halved(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same surface with twice the triangles."""
     i, j, k = triangles.T
-    middle = np.arange(len(triangles), dtype=triangles.dtype) + len(vertices)
+    midpoints = np.arange(len(triangles), dtype=triangles.dtype) + len(vertices)
     vertices = np.concatenate([vertices, (vertices[i] + vertices[j]) / 2])
-    cut = np.stack([np.stack([k, i, middle], 1), np.stack([j, k, middle], 1)], 1)
-    return vertices, cut.reshape(-1, 3), np.repeat(owner, 2)
+    halves = np.stack([np.stack([k, i, midpoints], 1), np.stack([j, k, midpoints], 1)], 1)
+    return vertices, halves.reshape(-1, 3), np.repeat(owner, 2)
 
 
 def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int) -> None:

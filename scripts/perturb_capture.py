@@ -114,45 +114,45 @@ def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--mesh-smooth", type=float, default=0.5, metavar="SHARE")
     parser.add_argument("--clip-at", choices=("sensor", "radiance"), default="sensor")
     parser.add_argument("--tell", action="store_true")
-    given = parser.parse_args(argv)
-    if all(getattr(given, name) is None for name in DEFAULTS):
+    options = parser.parse_args(argv)
+    if all(getattr(options, name) is None for name in DEFAULTS):
         for name, value in DEFAULTS.items():
-            setattr(given, name, value)
-    return given
+            setattr(options, name, value)
+    return options
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    given = arguments(argv)
-    source, out = given.capture, given.out
+    options = arguments(argv)
+    source, out = options.capture, options.out
     # A generator for each: one perturbation alone is the same as among all.
-    poses, mesh, exposures, pictures = (np.random.default_rng([given.seed, k]) for k in range(4))
-    top = json.loads((source / "transforms.json").read_text())
+    poses, mesh, exposures, pictures = (np.random.default_rng([options.seed, k]) for k in range(4))
+    transforms = json.loads((source / "transforms.json").read_text())
     out.mkdir(parents=True)
     for name in ("info_semantic.json", "README.md"):
         if (source / name).exists():
             shutil.copyfile(source / name, out / name)
     if (source / "truth").is_dir():
         shutil.copytree(source / "truth", out / "truth", copy_function=shutil.copyfile)
-    if given.mesh:
-        perturb_mesh(source / "mesh.ply", out / "mesh.ply", given.mesh / 1000, given.mesh_smooth, mesh)
+    if options.mesh:
+        perturb_mesh(source / "mesh.ply", out / "mesh.ply", options.mesh / 1000, options.mesh_smooth, mesh)
     else:
         shutil.copyfile(source / "mesh.ply", out / "mesh.ply")
-    clip, sensor = np.inf if given.clip is None else given.clip, given.clip_at == "sensor"
-    for frame in top["frames"]:
-        if given.poses:
-            millimetres, degrees = given.poses
+    clip, sensor = np.inf if options.clip is None else options.clip, options.clip_at == "sensor"
+    for frame in transforms["frames"]:
+        if options.poses:
+            millimetres, degrees = options.poses
             frame["transform_matrix"] = perturbed_pose(
                 frame["transform_matrix"], millimetres / 1000, np.radians(degrees), poses
             )
         exposure = 1.0
-        if given.exposure:
-            exposure = float(2 ** exposures.uniform(-given.exposure / 2, given.exposure / 2))
+        if options.exposure:
+            exposure = float(2 ** exposures.uniform(-options.exposure / 2, options.exposure / 2))
             frame["exposure"] = exposure
-        if given.tell and given.clip:
+        if options.tell and options.clip:
             frame["saturation"] = clip if sensor else clip * exposure
         paths = source / frame["file_path"], out / frame["file_path"]
-        perturb_picture(*paths, given.noise or 0.0, exposure, clip, sensor, pictures)
-    (out / "transforms.json").write_text(json.dumps(top, indent=1))
+        perturb_picture(*paths, options.noise or 0.0, exposure, clip, sensor, pictures)
+    (out / "transforms.json").write_text(json.dumps(transforms, indent=1))
     return 0
 
 

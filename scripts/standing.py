@@ -115,12 +115,12 @@ def main() -> None:
     add.add_argument("--report", type=Path, required=True)
     add.add_argument("--views", type=int, default=12)
     add.add_argument("--spp", type=int, default=32)
-    given = parser.parse_args()
-    if given.command == "add":
-        scores, report = (json.loads(path.read_text(encoding="utf-8")) for path in (given.scores, given.report))
+    options = parser.parse_args()
+    if options.command == "add":
+        scores, report = (json.loads(path.read_text(encoding="utf-8")) for path in (options.scores, options.report))
         command = ["git", "rev-parse", "--short", "HEAD"]
         commit = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
-        line = line_of(scores, report, given.capture, given.views, given.spp)
+        line = line_of(scores, report, options.capture, options.views, options.spp)
         line |= {"date": datetime.date.today().isoformat(), "commit": commit}
         with open(MEASURED, "a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")

@@ -23,9 +23,9 @@ SKIPPED = 3
 
 
 def main() -> int:
-    words = sys.argv[1:]
-    required = "--required" in words
-    words = [word for word in words if word != "--required"]
+    arguments = sys.argv[1:]
+    required = "--required" in arguments
+    arguments = [word for word in arguments if word != "--required"]
     blender, reason = find_blender()
     if blender is None:
         print(f"SKIPPED: THE WINDOW IS NOT TESTED HERE: {reason}")
@@ -33,9 +33,9 @@ def main() -> int:
     os.environ["BLENDER"] = blender
     shutil.rmtree(ROOT / "build" / "window", ignore_errors=True)
     python = sys.executable if running_inside() else str(prepare(tools=True))
-    if not any("tests/window" in word for word in words):
-        words = ["tests/window", *words]
-    return hand_over([python, "-m", "pytest", *words])
+    if not any("tests/window" in word for word in arguments):
+        arguments = ["tests/window", *arguments]
+    return hand_over([python, "-m", "pytest", *arguments])
 
 
 def running_inside() -> bool:

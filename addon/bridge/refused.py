@@ -29,16 +29,16 @@ def refused(what: str, advice: str, *also: type[Exception]) -> Iterator[None]:
 @contextmanager
 def whole_folder(folder: Path, what: str) -> Iterator[Path]:
     """Hand out an empty folder beside `folder` that takes its place at the end; raises as `refused`."""
-    part = folder.with_name(folder.name + ".part")
+    partial = folder.with_name(folder.name + ".part")
     try:
         with refused(what, "free some space or choose another folder", BadInputError):  # what was written is cut off
-            shutil.rmtree(part, ignore_errors=True)
-            part.mkdir(parents=True)
-            yield part
+            shutil.rmtree(partial, ignore_errors=True)
+            partial.mkdir(parents=True)
+            yield partial
             shutil.rmtree(folder, ignore_errors=True)
-            os.replace(part, folder)
+            os.replace(partial, folder)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def sentences(*remarks: tuple[list[str], str]) -> tuple[str, ...]:

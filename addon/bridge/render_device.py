@@ -42,14 +42,14 @@ def use_device(scene: bpy.types.Scene, device: str) -> str:
         There is no such kind of device.
     """
     kind, _, ids = device.partition("=")
-    kind, wanted = kind.strip().upper(), {card for card in ids.split("|") if card}
+    kind, device_ids = kind.strip().upper(), {card for card in ids.split("|") if card}
     if kind not in (CPU, GPU, *TYPES):
         raise BadInputError(f"There is no device '{device}'; take cpu, gpu or one of {', '.join(TYPES).lower()}.")
     if kind == CPU:
         scene.cycles.device = "CPU"
         return ""
     for device_type in TYPES if kind == GPU else (kind,):
-        if _enable(device_type, wanted):
+        if _enable(device_type, device_ids):
             scene.cycles.device = "GPU"
             return ""
     scene.cycles.device = "CPU"
@@ -63,21 +63,21 @@ def preferences_of_cycles():
     return addon.preferences if addon else None
 
 
-def _enable(kind: str, wanted: set[str]) -> bool:
-    """Switch on the devices of a kind, those of `wanted` alone if there are any; whether there is one."""
+def _enable(kind: str, device_ids: set[str]) -> bool:
+    """Switch on the devices of a kind, those of `device_ids` alone if there are any; whether there is one."""
     preferences = preferences_of_cycles()
     if preferences is None:
         return False
-    before = preferences.compute_device_type
+    previous = preferences.compute_device_type
     try:
         preferences.compute_device_type = kind
     except TypeError:  # this Blender was built without it
         return False
     preferences.refresh_devices()
     cards = [device for device in preferences.devices if device.type == kind]
-    chosen = [device for device in cards if device.id in wanted] or cards
+    chosen = [device for device in cards if device.id in device_ids] or cards
     for device in preferences.devices:
-        device.use = device in chosen or device.id in wanted
+        device.use = device in chosen or device.id in device_ids
     if not chosen:
-        preferences.compute_device_type = before
+        preferences.compute_device_type = previous
     return bool(chosen)

@@ -29,20 +29,20 @@ def main(argv: list[str] | None = None) -> int:
     score = commands.add_parser("score", help="compare a result with the truth")
     score.add_argument("capture", type=Path)
     score.add_argument("result", type=Path)
-    given = parser.parse_args(argv)
-    if given.command == "make":
+    options = parser.parse_args(argv)
+    if options.command == "make":
         from .render import render
         from .rooms import ROOMS
 
-        width, height = map(int, given.size.split("x"))
-        room = ROOMS[given.kind](given.seed)
-        if given.ground:
-            room.surround(given.ground)
-        render(room, given.out, given.frames, (width, height), given.samples, given.views, given.denoise)
+        width, height = map(int, options.size.split("x"))
+        room = ROOMS[options.kind](options.seed)
+        if options.ground:
+            room.surround(options.ground)
+        render(room, options.out, options.frames, (width, height), options.samples, options.views, options.denoise)
     else:
         from .score import table
 
-        sys.stdout.write(table(given.capture, given.result))
+        sys.stdout.write(table(options.capture, options.result))
     return 0
 
 

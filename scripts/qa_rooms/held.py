@@ -12,7 +12,7 @@ MIN_ELEMENTS = 20
 """Known and measured elements from which on an object's mean is judged."""
 
 
-def held(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> dict[str, float]:
+def interval_coverage(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> dict[str, float]:
     """By area: of Base Color's elements, measured and filled in; of objects' means; of roughnesses.
 
     Parameters
@@ -27,11 +27,11 @@ def held(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> di
     base = recovery.base_color()
     true = projected_truth(held_out, len(atlas), np.full_like(base, np.nan))
     points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in held_out)
-    plain = [i for i, m in materials.items() if m.model.has_albedo]
-    known = np.isfinite(true).all(1) & (points >= MIN_POINTS) & np.isin(atlas.object_id, plain)
+    with_albedo = [i for i, m in materials.items() if m.model.has_albedo]
+    known = np.isfinite(true).all(1) & (points >= MIN_POINTS) & np.isin(atlas.object_id, with_albedo)
     # The errors are those of the diffuse albedo, Base Color is more by what the specular layer takes.
     scale = np.maximum(base / np.maximum(albedo.rho, 1e-3), 1)
-    within = (np.abs(base - true) <= Z90 * scale * evidence.texels.albedo + 1e-6).mean(1)
+    covered = (np.abs(base - true) <= Z90 * scale * evidence.texels.albedo + 1e-6).mean(1)
     measured = albedo.origin == MEASURED
     means = []
     for entry in evidence.objects:
@@ -40,7 +40,7 @@ def held(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> di
             mean, mean_scale = (np.average(x[elements], 0, atlas.area[elements]) for x in (true, scale))
             low, high = np.array(entry.albedo_low) * mean_scale, np.array(entry.albedo_high) * mean_scale
             means.append(((low <= mean) & (mean <= high)).mean())
-    rough = [
+    in_interval = [
         m.roughness_low <= np.sqrt(truth[i]["alpha"]) <= m.roughness_high
         for i, m in materials.items()
         if m.model.has_lobe and m.roughness_low is not None and truth[i]["alpha"] is not None
@@ -48,13 +48,13 @@ def held(recovery: Recovery, held_out: list[dict], truth: dict[int, dict]) -> di
 
     def share(chosen: np.ndarray) -> float:
         area = atlas.area[chosen]
-        return float((within[chosen] * area).sum() / area.sum()) if chosen.any() else float("nan")
+        return float((covered[chosen] * area).sum() / area.sum()) if chosen.any() else float("nan")
 
     return {
         "measured": share(known & measured),
         "filled in": share(known & ~measured),
         "objects' means": float(np.mean(means)) if means else float("nan"),
-        f"roughness ({len(rough)})": float(np.mean(rough)) if rough else float("nan"),
+        f"roughness ({len(in_interval)})": float(np.mean(in_interval)) if in_interval else float("nan"),
     }
 
 

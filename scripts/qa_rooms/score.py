@@ -19,7 +19,7 @@ from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.settings import Settings
 
-from .held import held, projected_truth
+from .held import interval_coverage, projected_truth
 
 
 def table(capture: Path, result: Path) -> str:
@@ -73,7 +73,7 @@ def compare(capture: Path, result: Path) -> dict:
         base, rho, E = recovery.base_color(), recovery.albedo.rho, recovery.irradiance
         materials = {m.object_id: m for m in recovery.materials()}
         measured = recovery.albedo.origin == MEASURED
-        warnings, shares = recovery.report()["warnings"], held(recovery, held_out, truth)
+        warnings, shares = recovery.report()["warnings"], interval_coverage(recovery, held_out, truth)
     for view, frame in zip(held_out, json.loads((capture / "truth" / "transforms.json").read_text())["frames"]):
         name = Path(frame["file_path"]).name
         for kind in ("diffuse_light", "diffuse_color"):
@@ -81,28 +81,28 @@ def compare(capture: Path, result: Path) -> dict:
             view[kind] = read_exr(path).rgb.reshape(-1, 3) if path.exists() else np.full_like(view["truth"], np.nan)
     object_ids = np.concatenate([view["id"] for view in held_out])
     pixels = {i: int((object_ids == i).sum()) for i in truth}
-    split = {"albedo": rho, "L_d": np.maximum(lit.radiance - specular.specular, 0), "median": lit.radiance, "E": E}
-    ratios, share = _ratios(held_out, split, base, truth)
+    quantities = {"albedo": rho, "L_d": np.maximum(lit.radiance - specular.specular, 0), "median": lit.radiance, "E": E}
+    ratios, share = _ratios(held_out, quantities, base, truth)
     scores = {"Base Color as written": psnr(held_out, base)}
     scores |= _scaled(held_out, base)
     scores["on measured elements only"] = psnr(held_out, base, measured)
     scores["the truth itself through the texels"] = psnr(held_out, projected_truth(held_out, len(E), base))
     ids_of = recovery.surface().atlas.object_id
     for name, kinds in (("E", ("E",)), ("L_d", ("L_d",)), ("E and L_d", ("E", "L_d"))):
-        fixed = base.copy()
+        corrected = base.copy()
         for i, ratio in ratios.items():
             elements = ids_of == i
             for kind in kinds:
                 if ratio.get(kind) is not None:
-                    fixed[elements] *= np.asarray(ratio[kind]) if kind == "E" else 1 / np.maximum(ratio[kind], 0.05)
-        scores[f"Base Color with each object's {name} put right (one factor a channel)"] = psnr(held_out, fixed)
+                    corrected[elements] *= np.asarray(ratio[kind]) if kind == "E" else 1 / np.maximum(ratio[kind], 0.05)
+        scores[f"Base Color with each object's {name} put right (one factor a channel)"] = psnr(held_out, corrected)
     rows, scored = [], score_materials(materials.values(), truth, pairs(held_out))
     for i, true in truth.items():
         material = materials[i]
         elements = np.isin(ids_of, [i])
         rows.append({
             "id": i, "class_name": true["class_name"], "pixels": pixels[i], "share": share.get(i, 0.0),
-            **{k: ratios.get(i, {}).get(k) for k in split},
+            **{k: ratios.get(i, {}).get(k) for k in quantities},
             "measured": float(measured[elements].mean()) if elements.any() else 0.0,
             "model": material.model.name, "true_model": true_kind(true),
             "roughness": found_roughness(material), "true_roughness": true_roughness(true),
@@ -161,11 +161,11 @@ def _scaled(held_out: list[dict], base: np.ndarray) -> dict[str, float]:
     }
 
 
-def _ratios(held_out, split, base, truth) -> tuple[dict, dict]:
+def _ratios(held_out, quantities, base, truth) -> tuple[dict, dict]:
     """Median of estimate / truth by object, quantity and channel; and each object's share of the squared error."""
     light, colour, ids = (_true_values(held_out, key) for key in ("diffuse_light", "diffuse_color", "id"))
     true = {"albedo": colour, "L_d": light * colour, "median": light * colour, "E": np.pi * light}
-    estimate = {kind: _estimates(held_out, values) for kind, values in split.items()}
+    estimate = {kind: _estimates(held_out, values) for kind, values in quantities.items()}
     error = np.square(np.clip(_estimates(held_out, base), 0, 1) - np.clip(_true_values(held_out, "truth"), 0, 1)).sum(1)
     share = {int(i): float(error[ids == i].sum() / error.sum()) for i in np.unique(ids)}
     ratios = {}
@@ -174,12 +174,12 @@ def _ratios(held_out, split, base, truth) -> tuple[dict, dict]:
         if mask.sum() < 20:
             continue
         ratios[i] = {}
-        for kind in split:
+        for kind in quantities:
             a, b = estimate[kind][mask], true[kind][mask]
-            good = np.isfinite(a).all(1) & np.isfinite(b).all(1)
+            finite = np.isfinite(a).all(1) & np.isfinite(b).all(1)
             # The truth's light is noisy: sums over blocks of pixels are compared.
-            n = max(1, good.sum() // 40)
-            blocks = np.array_split(np.flatnonzero(good), n)
+            n = max(1, finite.sum() // 40)
+            blocks = np.array_split(np.flatnonzero(finite), n)
             quotient = [a[block].sum(0) / np.maximum(b[block].sum(0), 1e-9) for block in blocks if len(block)]
             ratios[i][kind] = np.median(quotient, 0).tolist() if quotient else None
     return ratios, share

@@ -83,18 +83,20 @@ def give(obj: bpy.types.Object, **values) -> None:
     BadInputError
         A value is impossible, or `same_as` would form a circle.
     """
-    number = obj[OBJECT_ID]
+    object_id = obj[OBJECT_ID]
     room = {member[OBJECT_ID]: member for member in room_of(obj)}
     newer = parse(
-        {"objects": {str(number): {key: _plain(value) for key, value in values.items()}}}, f"Object '{obj.name}'", room
+        {"objects": {str(object_id): {key: _plain(value) for key, value in values.items()}}},
+        f"Object '{obj.name}'",
+        room,
     )
-    older = {i: Given(**_tuples(given(member))) for i, member in room.items() if i == number or GIVEN in member}
-    override = merge(Overrides(older), newer).of(number).as_dict()
+    older = {i: Given(**_tuples(given(member))) for i, member in room.items() if i == object_id or GIVEN in member}
+    override = merge(Overrides(older), newer).of(object_id).as_dict()
     material.note(obj)
     obj[GIVEN] = json.dumps(override)
     show(obj)
     for other in room_of(obj):
-        if other != obj and GIVEN in other and given(other).get("same_as") == number:
+        if other != obj and GIVEN in other and given(other).get("same_as") == object_id:
             show(other)
 
 
@@ -114,9 +116,9 @@ def _tuples(override: dict[str, Any]) -> dict[str, Any]:
     return {key: tuple(value) if isinstance(value, list) else value for key, value in override.items()}
 
 
-def by_id(obj: bpy.types.Object, number: int) -> bpy.types.Object | None:
+def by_id(obj: bpy.types.Object, object_id: int) -> bpy.types.Object | None:
     """Another object of the same room."""
-    return next((other for other in room_of(obj) if other[OBJECT_ID] == number and correctable(other)), None)
+    return next((other for other in room_of(obj) if other[OBJECT_ID] == object_id and correctable(other)), None)
 
 
 def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:

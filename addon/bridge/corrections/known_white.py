@@ -75,11 +75,11 @@ def _albedo_around(obj, uv) -> list[float]:
 def _uv(obj, location, depsgraph):
     data = obj.data
     local = obj.matrix_world.inverted() @ location
-    _, near, _, face = obj.closest_point_on_mesh(local, depsgraph=depsgraph)
+    _, nearest, _, face = obj.closest_point_on_mesh(local, depsgraph=depsgraph)
     polygon = data.polygons[face] if 0 <= face < len(data.polygons) else None
     if polygon is None:
         raise BadInputError(f"'{obj.name}' was changed by a modifier there; click on another spot.")
-    weights = poly_3d_calc([data.vertices[index].co for index in polygon.vertices], near)
+    weights = poly_3d_calc([data.vertices[index].co for index in polygon.vertices], nearest)
     layer = data.uv_layers[ATLAS_UV].uv
     corners = [layer[loop].vector for loop in polygon.loop_indices]
     return [sum(weight * corner[k] for weight, corner in zip(weights, corners, strict=True)) for k in (0, 1)]

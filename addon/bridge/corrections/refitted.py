@@ -51,8 +51,8 @@ def words(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[
     """
     objects = list(objects)
     folder = corrections.folder_for(objects)
-    numbers = corrections.keep(scene, folder) | {obj[OBJECT_ID] for obj in objects}
-    options = [word for number in sorted(numbers) for word in ("--object", str(number))]
+    object_ids = corrections.keep(scene, folder) | {obj[OBJECT_ID] for obj in objects}
+    options = [word for object_id in sorted(object_ids) for word in ("--object", str(object_id))]
     return folder, ["refit", str(folder), *options], corrections.made_by(folder)
 
 
@@ -82,15 +82,15 @@ def bringing(
         obj for obj in scene.objects if corrections.correctable(obj) and corrections.result_folder(obj) == folder
     ]
     image = _renew_images(folder)
-    run, warnings, by_hand = after.run, [], []
+    run, warnings, edited = after.run, [], []
     for done, obj in enumerate(objects):
         yield done / max(len(objects), 1)
-        number = obj[OBJECT_ID]
-        entry = after.objects.get(number)
+        object_id = obj[OBJECT_ID]
+        entry = after.objects.get(object_id)
         mark(obj, folder, run)
-        if entry is not None and any(entry.get(key) != before.get(number, {}).get(key) for key in _MATERIAL_KEYS):
+        if entry is not None and any(entry.get(key) != before.get(object_id, {}).get(key) for key in _MATERIAL_KEYS):
             if is_corrected(worn_material(obj)):
-                by_hand.append(obj.name)
+                edited.append(obj.name)
                 continue
             node_images = (getattr(node, "image", None) for node in worn_material(obj).node_tree.nodes)
             _dress(obj, entry, next((texture for texture in node_images if texture and UV_MAP in texture), image))
@@ -99,7 +99,7 @@ def bringing(
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             mark(collection, folder, run)
             changes.keep(collection, changes.found(folder))
-    return (*warnings, *sentences((by_hand, "the material was edited by hand and stays")))
+    return (*warnings, *sentences((edited, "the material was edited by hand and stays")))
 
 
 def _dress(obj: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:

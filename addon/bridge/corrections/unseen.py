@@ -252,10 +252,10 @@ def _fill(objects, coverage_map, where, skipped) -> int:
     owners = _in_same_atlas(objects[0])
     atlas = _elements(owners, coverage_map.shape[0])
     observed, quality = (coverage_map[..., k].ravel()[atlas.texel] for k in (0, 2))
-    number = {obj: k for k, obj in enumerate(owners)}
+    index_of = {obj: k for k, obj in enumerate(owners)}
     filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
     for obj in objects:
-        elements = np.flatnonzero(atlas.object_id == number[obj])
+        elements = np.flatnonzero(atlas.object_id == index_of[obj])
         unseen, measured = (
             elements[observed[elements] < 0.5],
             elements[(observed[elements] >= 0.5) & was_measured(quality[elements])],
@@ -298,15 +298,15 @@ def _in_same_atlas(obj: bpy.types.Object) -> list[bpy.types.Object]:
 def _elements(objects: list[bpy.types.Object], size: int) -> Atlas:
     from ...core.scene.elements import make_atlas
 
-    vertices, triangles, uv, number, first = [], [], [], [], 0
+    vertices, triangles, uv, object_ids, first = [], [], [], [], 0
     for k, obj in enumerate(objects):
         data = obj.data
         vertices.append(vertices_of(data, obj.matrix_world).astype(np.float32))
         triangles.append(triangles_of(data) + first)
         uv.append(layer_of(data, ATLAS_UV)[triangles_of(data, "loops")])
-        number.append(np.full(len(triangles[-1]), k, np.int32))
+        object_ids.append(np.full(len(triangles[-1]), k, np.int32))
         first += len(data.vertices)
-    return make_atlas(Mesh(*map(np.concatenate, (vertices, triangles, number))), np.concatenate(uv), size)
+    return make_atlas(Mesh(*map(np.concatenate, (vertices, triangles, object_ids))), np.concatenate(uv), size)
 
 
 def _renew(image, source, obj) -> None:

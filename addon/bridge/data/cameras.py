@@ -128,11 +128,11 @@ def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def size_warning(frames: Iterable[Frame]) -> str:
     """One sentence if the frames don't share one size and pixel shape, which scenes have and not cameras; '' if so."""
-    kinds = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
-    if len(kinds) < 2:
+    formats = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
+    if len(formats) < 2:
         return ""
     return (
-        f"The frames have {len(kinds)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
+        f"The frames have {len(formats)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
         "camera: set the render size from the camera's custom properties before you render through another one."
     )
 
@@ -149,10 +149,10 @@ def kept_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None
 
 def lens_warning(frames: Iterable[Frame]) -> str:
     """One sentence if Blender's cameras can't have some of the frames' lenses ('' if they can): the error in pixels."""
-    bent = [frame.camera for frame in frames if frame.camera.lens is not None]
-    kinds = {(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens): c for c in bent}
+    cameras = [frame.camera for frame in frames if frame.camera.lens is not None]
+    distinct = {(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens): c for c in cameras}
     error, camera = max(
-        ((max_pixel_error(c), c) for c in kinds.values()), key=lambda pair: pair[0], default=(0.0, None)
+        ((max_pixel_error(c), c) for c in distinct.values()), key=lambda pair: pair[0], default=(0.0, None)
     )
     if error < _REPORTED_ERROR:
         return ""
@@ -201,8 +201,8 @@ def _angles(camera: Camera) -> np.ndarray:
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)], -1).reshape(-1, 2)
     rays, valid = camera.lens.unproject(points)
     theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]).reshape(radius.shape)
-    good = valid.reshape(radius.shape).all(1)
-    radius, theta = radius[good, 0], theta[good].mean(1)
+    usable = valid.reshape(radius.shape).all(1)
+    radius, theta = radius[usable, 0], theta[usable].mean(1)
     millimetres = camera.fx * _SENSOR / camera.width * radius
     pixels = 1 / np.maximum(np.gradient(theta, radius), 1e-6)  # how much a wrong angle counts
     powers = (millimetres / millimetres[-1])[:, None] ** np.arange(1, 5)

@@ -50,8 +50,8 @@ def each_object(
         if indices is None:
             continue
         # Triangles that repeat a vertex are dropped by no one: they show nothing.
-        used, corners = np.unique(mesh.triangles[indices].ravel(), return_inverse=True)
-        vertices = mesh.vertices[used]
+        vertex_ids, corners = np.unique(mesh.triangles[indices].ravel(), return_inverse=True)
+        vertices = mesh.vertices[vertex_ids]
         centre = (vertices.min(0) + vertices.max(0)) / 2
         data = make_mesh(instance.name, vertices - centre, corners.reshape(-1, 3))
         for name, uv in ((ATLAS_UV, atlas_uv), (CAPTURE_UV, mesh.uv), (PARTS_UV, parts_uv)):

@@ -71,26 +71,26 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
     if not len(mesh.triangles):
         return np.zeros((0, 3, 2), np.float32)
     a, b, c = mesh.triangles.T
-    whole = (a != b) & (b != c) & (c != a)  # Blender can't hold others
-    triangles, object_id = mesh.triangles[whole], mesh.object_id[whole]
+    valid = (a != b) & (b != c) & (c != a)  # Blender can't hold others
+    triangles, object_id = mesh.triangles[valid], mesh.object_id[valid]
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     if polygons is not None:
         polygons = _with_more(polygons, mesh.triangles)
-        polygons = polygons._replace(corner=polygons.corner[whole])
+        polygons = polygons._replace(corner=polygons.corner[valid])
     if len(triangles):
-        uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
+        uv[valid] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
     return np.clip(uv, 0, 1)
 
 
 def _with_more(polygons, triangles):
     """The faces, and one for each triangle beyond theirs."""
-    more = triangles[len(polygons.corner) :]
-    if not len(more):
+    extra = triangles[len(polygons.corner) :]
+    if not len(extra):
         return polygons
-    corner = len(polygons.vertex) + np.arange(more.size).reshape(-1, 3)
+    corner = len(polygons.vertex) + np.arange(extra.size).reshape(-1, 3)
     return Polygons(
         np.r_[polygons.start, corner[:, 2] + 1].astype(polygons.start.dtype),
-        np.r_[polygons.vertex, more.ravel()].astype(polygons.vertex.dtype),
+        np.r_[polygons.vertex, extra.ravel()].astype(polygons.vertex.dtype),
         np.r_[polygons.corner, corner].astype(polygons.corner.dtype),
     )
 

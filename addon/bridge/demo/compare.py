@@ -31,13 +31,13 @@ def comparison(capture: Path, result: Path) -> str:
         if true["id"] not in recovered:
             rows.append([true["class_name"], "missing", *[""] * 8])
             continue
-        entry, gloss = recovered[true["id"]], true["alpha"] is not None
+        entry, glossy = recovered[true["id"]], true["alpha"] is not None
         material = from_json(entry)
         colour = material.model.base_color(np.float32([entry["evidence"]["albedo"]]), material)[0]
         pairs = (
             (None if material.model.gives_light else colour, None if true["emission"] else true_colours[true["id"]]),
-            (None if material.alpha is None else material.alpha**0.5, true["alpha"] ** 0.5 if gloss else None),
-            (material.f0, true["f0"] if gloss else None),
+            (None if material.alpha is None else material.alpha**0.5, true["alpha"] ** 0.5 if glossy else None),
+            (material.f0, true["f0"] if glossy else None),
             (material.emission, true["emission"]),
         )
         rows.append([true["class_name"], material.model.name, *(numbers(value) for pair in pairs for value in pair)])

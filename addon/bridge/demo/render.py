@@ -45,10 +45,10 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
     objects = room()
     frames, width, height, samples = SIZES[size]
     poses = tour(frames)
-    with whole_folder(folder, f"The demo's capture can't be written to '{folder}'") as part:
-        write_all_but_frames(part, objects, poses, (width, height))
-        render_frames(part, objects, poses, (width, height), samples, progress)
-        (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
+    with whole_folder(folder, f"The demo's capture can't be written to '{folder}'") as partial:
+        write_all_but_frames(partial, objects, poses, (width, height))
+        render_frames(partial, objects, poses, (width, height), samples, progress)
+        (partial / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
     return folder
 
 

@@ -139,7 +139,7 @@ def copies(
         collection = bpy.data.collections.new(_COLLECTION)
         scene.collection.children.link(collection)
         pictures: dict = {}
-        plain: dict = {}
+        plain_materials: dict = {}
         objects, extra = list(objects), list(extra)
         for obj, name in zip(objects + extra, unique(own_name(obj) for obj in objects + extra)):
             copy = obj.copy()
@@ -153,12 +153,14 @@ def copies(
             for old_slot, slot in zip(obj.material_slots, copy.material_slots):
                 if old_slot.material is None:
                     continue
-                if old_slot.material not in plain:
-                    plain[old_slot.material] = plain_copy(old_slot.material, textures, pictures, level, _tiles(obj))
+                if old_slot.material not in plain_materials:
+                    plain_materials[old_slot.material] = plain_copy(
+                        old_slot.material, textures, pictures, level, _tiles(obj)
+                    )
                 slot.link = "OBJECT"
-                slot.material = plain[old_slot.material]
-        for material, name in zip(plain, unique(map(own_name, plain))):
-            names.give("materials", plain[material], name)
+                slot.material = plain_materials[old_slot.material]
+        for material, name in zip(plain_materials, unique(map(own_name, plain_materials))):
+            names.give("materials", plain_materials[material], name)
         # By their first objects: one mesh may be worn by several.
         meshes = {copy.data: copy for copy in reversed(collection.objects) if copy.type == "MESH"}
         mesh_names = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
@@ -252,18 +254,18 @@ def put(staging: Path, path: Path) -> None:
     names = sorted(
         {entry.name for entry in staging.iterdir()} | {textures_of(path)}, key=lambda name: name == path.name
     )
-    partial, before = ({name: path.parent / f".{kind}-{name}" for name in names} for kind in ("partial", "before"))
+    partial, backup = ({name: path.parent / f".{kind}-{name}" for name in names} for kind in ("partial", "before"))
     done = []
     try:
         for name in names:
-            _remove(partial[name], before[name])
+            _remove(partial[name], backup[name])
             if (staging / name).is_dir() and any((staging / name).iterdir()):
                 shutil.copytree(staging / name, partial[name])
             elif (staging / name).is_file():
                 shutil.copyfile(staging / name, partial[name])
         for name in names:
             if (path.parent / name).exists():
-                (path.parent / name).replace(before[name])
+                (path.parent / name).replace(backup[name])
             done.append(name)
             if partial[name].exists():
                 partial[name].replace(path.parent / name)
@@ -271,12 +273,12 @@ def put(staging: Path, path: Path) -> None:
         with suppress(OSError):
             for name in reversed(done):
                 _remove(path.parent / name)
-                if before[name].exists():
-                    before[name].replace(path.parent / name)
+                if backup[name].exists():
+                    backup[name].replace(path.parent / name)
         raise
     finally:
         _remove(*partial.values())
-    _remove(*before.values())
+    _remove(*backup.values())
 
 
 def _remove(*paths: Path) -> None:
@@ -324,8 +326,8 @@ class Names:
         """Rename `item` of ``bpy.data``'s collection `kind` to `name`; linked data keep theirs."""
         if item.library or item.name == name:
             return
-        known = getattr(bpy.data, kind)
-        bearer = known.get((name, None))
+        datablocks = getattr(bpy.data, kind)
+        bearer = datablocks.get((name, None))
         if bearer is not None:
             self._rename(bearer, f"{_ASIDE}{len(self._before)}")
         self._rename(item, name)

@@ -103,24 +103,24 @@ def refit(
     progress.stage(READ)
     result = open_result(folder, objects, override, heed_kept)
     with Store(folder) as store, told_in_a_sentence(store.folder):
-        again = Refit(result, store, progress)
+        refitting = Refit(result, store, progress)
         progress.done()
-        again.refit()
+        refitting.refit()
         if override is not None and heed_kept:
-            store.write_json(OVERRIDES, again.overrides.as_dict())
+            store.write_json(OVERRIDES, refitting.overrides.as_dict())
         progress.stage(WRITE)
-        again.look_closer()
+        refitting.look_closer()
         for name in (REPORT, SCENE) if scene else (REPORT,):
             store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
-        report = again.write_images()
+        report = refitting.write_images()
         progress.update(0.7)
         report["warnings"] = [text for text in report["warnings"] if text != OUTDATED] + [OUTDATED] * (not scene)
         if scene:
             capture = result.room.capture
-            frames = again.room_poses().of(capture.frames)
-            write_recovered(again, replace(capture, frames=frames, mesh=again.written_mesh()), fresh=True)
+            frames = refitting.room_poses().of(capture.frames)
+            write_recovered(refitting, replace(capture, frames=frames, mesh=refitting.written_mesh()), fresh=True)
         report["versions"] = versions() | package_versions()
-        report["refit"] = {"objects": sorted(again.touched), "seconds": round(time.monotonic() - started, 2)}
+        report["refit"] = {"objects": sorted(refitting.touched), "seconds": round(time.monotonic() - started, 2)}
         store.write_json(REPORT, report)
         progress.done()
     return report

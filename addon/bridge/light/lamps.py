@@ -52,9 +52,9 @@ def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
         m for m in lamps if numbered(m.name.casefold())[0] == query
     ]
     if not matches:
-        known = ", ".join(f"'{m.name}'" for m in lamps)
+        names = ", ".join(f"'{m.name}'" for m in lamps)
         raise BadInputError(
-            f"There is no lamp '{name}'; " + (f"known are {known}." if known else "the scan has no lamp at all.")
+            f"There is no lamp '{name}'; " + (f"known are {names}." if names else "the scan has no lamp at all.")
         )
     return matches
 

@@ -61,12 +61,16 @@ def key_of(obj: bpy.types.Object) -> str:
 def objects_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
     """A room's objects, wherever the artist has put them, and their duplicates."""
     root = Path(top[CAPTURE]).resolve()
-    same = {name: Path(name).resolve() == root for name in {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}}
-    within = {obj for obj in top.all_objects if OBJECT_ID in obj or "pixel_aspect" in obj}
+    same_capture = {
+        name: Path(name).resolve() == root for name in {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}
+    }
+    collected = {obj for obj in top.all_objects if OBJECT_ID in obj or "pixel_aspect" in obj}
     return [
         obj
         for obj in bpy.data.objects
-        if not obj.library and obj.users_collection and (same[obj[CAPTURE]] if CAPTURE in obj else obj in within)
+        if not obj.library
+        and obj.users_collection
+        and (same_capture[obj[CAPTURE]] if CAPTURE in obj else obj in collected)
     ]
 
 
@@ -265,19 +269,19 @@ def atlas_onto(data: bpy.types.Mesh, matrix: Matrix, source: bpy.types.Mesh, sou
     from scipy.spatial import cKDTree  # not earlier: Blender's start should not wait for it
 
     corners = _corners(source, source_matrix)
-    triangles, maps = corners.reshape(-1, 3, 3), uv.reshape(-1, 3, 2)
+    triangles, uv_triangles = corners.reshape(-1, 3, 3), uv.reshape(-1, 3, 2)
     total = read(data.polygons, "loop_total", kind=np.int32)
     face = np.repeat(np.arange(len(total)), total)
     points = _corners(data, matrix)
-    middle = np.stack([np.bincount(face, points[:, axis], len(total)) for axis in range(3)], 1) / total[:, None]
-    nearest = cKDTree(triangles.mean(1)).query(middle)[1][face]
+    centres = np.stack([np.bincount(face, points[:, axis], len(total)) for axis in range(3)], 1) / total[:, None]
+    nearest = cKDTree(triangles.mean(1)).query(centres)[1][face]
     first = triangles[nearest, 0]
     edges = triangles[nearest, 1:] - first[:, None]
     # Least squares on the triangle's plane; a sliver's pseudo-inverse stays finite.
-    share = np.einsum("ijk,ik->ij", np.linalg.pinv(edges.transpose(0, 2, 1)), points - first)
-    steps = maps[nearest, 1:] - maps[nearest, :1]
-    new = (maps[nearest, 0] + np.einsum("ij,ijk->ik", share, steps)).clip(0, 1)
-    set_layer(data, ATLAS_UV, new).active_render = True
+    weights = np.einsum("ijk,ik->ij", np.linalg.pinv(edges.transpose(0, 2, 1)), points - first)
+    uv_edges = uv_triangles[nearest, 1:] - uv_triangles[nearest, :1]
+    new_uv = (uv_triangles[nearest, 0] + np.einsum("ij,ijk->ik", weights, uv_edges)).clip(0, 1)
+    set_layer(data, ATLAS_UV, new_uv).active_render = True
 
 
 def _corners(data: bpy.types.Mesh, matrix: Matrix) -> np.ndarray:

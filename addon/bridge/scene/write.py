@@ -56,7 +56,7 @@ def _build(
         if (folder / name).exists()
     }
     top = new_room(capture.root)
-    room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
+    room, lamps, camera_collection = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
     objects = dict(each_object(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv))
     run = run_of(folder)
@@ -77,12 +77,14 @@ def _build(
             lamps.objects.link(obj)
         stamp(obj, instance.name)
     panels = make_openings(folder, lamps)
-    cameras = make_cameras(capture.frames, eyes)
-    track = make_track(cameras, eyes)
+    cameras = make_cameras(capture.frames, camera_collection)
+    track = make_track(cameras, camera_collection)
     scene.world = make_world("Scan Relight", images.get(ENVIRONMENT))
     stamp_tree(scene.world)
     _prepare(scene, median_radiance)
-    use_camera(scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, eyes))
+    use_camera(
+        scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, camera_collection)
+    )
     scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
     scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
     scene[EXPOSURE] = scene.view_settings.exposure
