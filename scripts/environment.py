@@ -88,7 +88,7 @@ def run(command: list[str]) -> None:
 
 
 def hand_over(command: list[str]) -> int:
-    """Run the program that was asked for, with Ctrl-C left to it; returns its exit code."""
+    """Run the requested program, with Ctrl-C left to it; returns its exit code."""
     process = subprocess.Popen(command, cwd=ROOT)
     while True:
         try:

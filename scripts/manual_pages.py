@@ -17,7 +17,7 @@ LEFT_OUT = ("benchmark",)
 
 
 def anchor(heading: str) -> str:
-    """The name by which links know a heading, as code forges make it."""
+    """The anchor that links to a heading, as code forges make it."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
 
 
@@ -78,7 +78,7 @@ def page(text: str) -> str:
 
 
 def table(lines: list[str]) -> str:
-    """A table; its second line only says that the first is its head."""
+    """A table; its second line only marks the first as its head."""
     rows = [[inline(cell.strip()) for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))] for line in lines]
     head, body = rows[0], rows[2:]
     cells = ["".join(f"<th>{cell}</th>" for cell in head)]

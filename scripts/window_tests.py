@@ -1,4 +1,4 @@
-"""One command for the tests in a real window: has a Blender, builds the zip, installs it and plays tests/window.
+"""One command for the tests in a real window: finds a Blender, builds the zip, installs it and plays tests/window.
 
     python3.11 scripts/window_tests.py [--required] [what pytest takes]
 

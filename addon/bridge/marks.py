@@ -1,4 +1,4 @@
-"""Names of the custom properties by which recovered data is known again: in this session, in a saved file, anywhere.
+"""Names of the custom properties that identify recovered data: in this session, in a saved file, anywhere.
 
 They need no registered add-on, so that a file keeps its meaning where the extension is not installed.
 """
@@ -20,15 +20,15 @@ LAYOUT = "scan_relight_layout"
 OWN_SCENE = "scan_relight_own"
 """Of a scene: True where it was made for a room and holds nothing else of the artist's."""
 GIVEN = "scan_relight_given"
-"""Of an object: JSON of what the artist says of its material, as an override holds it; absent where nothing is said."""
+"""Of an object: JSON of the artist's override of its material; absent where there is none."""
 WHITE = "scan_relight_white"
-"""Of an object: the albedo, three numbers, that the artist says it has; it fixes the whole room's scale."""
+"""Of an object: the albedo, three numbers, that the artist gave; it fixes the whole room's scale."""
 LAST_FOUND = "scan_relight_last_found"
 """Of a room's collection: JSON of what its last run found of each object."""
 CHANGES = "scan_relight_changes"
 """Of a scene: what differs since the run before, as JSON: a list of objects with `object_id`, `name` and `text`."""
 FOUND = "scan_relight_found"
-"""Of an object: JSON of what was found where something else is given now."""
+"""Of an object: JSON of the recovered values that an override replaces."""
 PAINTED = "scan_relight_painted"
 """Of an object: the artist's own Base Color image, which later runs leave alone. Of that image: where it came from."""
 SMOOTH = "scan_relight_smooth"
@@ -39,7 +39,7 @@ UV_MAP = "scan_relight_uv_map"
 
 
 def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
-    """Say on an object or a room's collection which run made it.
+    """Mark an object or a room's collection with the run that made it.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from collections.abc import Generator
 
 
 def whole(slices: Generator):
-    """Do all slices of a piece of work at once; what it returns."""
+    """Do all slices of a piece of work at once; returns what the generator returns."""
     while True:
         try:
             next(slices)

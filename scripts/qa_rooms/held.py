@@ -29,7 +29,7 @@ def interval_coverage(recovery: Recovery, held_out: list[dict], truth: dict[int,
     points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in held_out)
     with_albedo = [i for i, m in materials.items() if m.model.has_albedo]
     known = np.isfinite(true).all(1) & (points >= MIN_POINTS) & np.isin(atlas.object_id, with_albedo)
-    # The errors are those of the diffuse albedo, Base Color is more by what the specular layer takes.
+    # The errors are those of the diffuse albedo; Base Color is greater by what the specular layer takes.
     scale = np.maximum(base / np.maximum(albedo.rho, 1e-3), 1)
     covered = (np.abs(base - true) <= Z90 * scale * evidence.texels.albedo + 1e-6).mean(1)
     measured = albedo.origin == MEASURED
@@ -59,7 +59,7 @@ def interval_coverage(recovery: Recovery, held_out: list[dict], truth: dict[int,
 
 
 def projected_truth(held_out: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
-    """The truth as elements could hold it at best: the mean of what the held-out views themselves show of each."""
+    """The best that elements could reach: the mean of the held-out views' true albedo at each."""
     total, hits = np.zeros((count, 3)), np.zeros(count)
     for view in held_out:
         for element in view["element"]:

@@ -146,7 +146,7 @@ def _sky(room: FurnishedRoom):
 
 
 def _override(scene) -> None:
-    """Every surface shows its base colour as light."""
+    """Make every surface emit its base colour."""
     scene.world = None
     for material in bpy.data.materials:
         shader, colour = principled(material), (0, 0, 0, 1)
@@ -158,7 +158,7 @@ def _override(scene) -> None:
 
 
 def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
-    """All lights off but one new one, which shines on one side."""
+    """Turn all lights off but one new one, which emits on one side."""
     scene.world = None
     for obj in list(scene.collection.objects):
         if obj.type == "LIGHT":
@@ -217,7 +217,7 @@ def render(
     shoot = demo_render.camera_of(scene, size, samples)
     scene.cycles.use_denoising = denoise
     scene.cycles.use_light_tree = True
-    # What is cut off after few bounces would look like light that E has too much of: 3 % in a white room after 6.
+    # Truncation after few bounces would look like an excess of E: 3 % in a white room after 6.
     scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 24
     scene.cycles.glossy_bounces = 12
     for k, pose in enumerate(poses):

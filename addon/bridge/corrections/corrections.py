@@ -51,7 +51,7 @@ def result_folder(obj: bpy.types.Object) -> Path | None:
 
 
 def made_by(folder: Path) -> dict[int, dict[str, Any]]:
-    """The objects of the run that lies in a result folder, as materials.json tells them, by number; {} for none."""
+    """The entries of a result folder's materials.json, by `object_id`; {} for none."""
     result = file.read(folder)
     return dict(result.objects) if result else {}
 
@@ -122,7 +122,7 @@ def by_id(obj: bpy.types.Object, object_id: int) -> bpy.types.Object | None:
 
 
 def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:
-    """What was found of an object (`material.found`) with what is given laid over it."""
+    """The values found of an object (`material.found`), overridden by those given."""
     override = given(obj)
     source = by_id(obj, override["same_as"]) if override.get("same_as") is not None else None
     copied = {}
@@ -160,7 +160,7 @@ def _base_values(obj: bpy.types.Object, override: dict, model: str | None) -> di
 
 
 def show(obj: bpy.types.Object) -> None:
-    """Bring an object's material in line with what is given."""
+    """Update an object's material to what is given."""
     if correctable(obj):
         with our_own(material.worn_material(obj)):
             material.show(obj, effective(obj))

@@ -1,4 +1,4 @@
-"""Data that is added to the open file: so that it can be taken away again, and in collections of its own."""
+"""Data that is added to the open file: to remove it again, and in collections of its own."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

@@ -73,7 +73,7 @@ def use_camera(scene: bpy.types.Scene, camera: bpy.types.Object, size: bool = Tr
 
 
 def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
-    """Index of the frame that a room is first seen through: the first one with the most objects' middles in it."""
+    """Index of the frame that a room is first seen through: the first with the most objects' centres in view."""
     _, owner = np.unique(mesh.object_id, return_inverse=True)
     centres = mesh.vertices[mesh.triangles].mean(1)
     middles = np.stack([np.bincount(owner, centres[:, axis]) for axis in range(3)], -1) / np.bincount(owner)[:, None]
@@ -251,7 +251,7 @@ def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bp
     data.shift_x = 0.5 - camera.cx / camera.width
     data.shift_y = (camera.cy - camera.height / 2) * aspect / camera.width
     if isinstance(camera.lens, Equirectangular):
-        aspect = 1.0  # its pixels may have any shape
+        aspect = 1.0  # a panorama's pixels may have any shape
     if camera.lens is not None and _is_wide(camera):
         _set_panorama(data, camera)
     data.clip_start, data.clip_end = 0.01, 1000.0
@@ -273,7 +273,7 @@ NO_FRAME: Code[int] = -1
 
 
 def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collection) -> bpy.types.Object | None:
-    """The camera along those of the frames, the timeline's frame k showing the k-th; None of fewer than two."""
+    """A camera animated along those of the frames, the timeline's frame k at the k-th; None of fewer than two."""
     if len(cameras) < 2:
         return None
     track = cameras[0].copy()
@@ -288,7 +288,7 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
     for frame, camera in enumerate(cameras, 1):
         location, rotation, _ = camera.matrix_basis.decompose()
         if previous is not None:
-            rotation.make_compatible(previous)  # of its two signs the one that turns the shorter way
+            rotation.make_compatible(previous)  # the quaternion's sign with the shorter rotation
         track.location, track.rotation_quaternion, previous = location, rotation, rotation
         track.keyframe_insert("location", frame=frame)
         track.keyframe_insert("rotation_quaternion", frame=frame)
@@ -299,5 +299,5 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
 
 
 def track_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The cameras of a scene that go along the track of a capture."""
+    """The cameras of a scene that are animated along a capture's track."""
     return [obj for obj in scene.objects if obj.type == "CAMERA" and obj.get(FRAME_INDEX, 0) == NO_FRAME]

@@ -17,7 +17,7 @@ RADIANCE = "Linear Rec.709"
 """Colour space of radiance, albedo and F0."""
 UDIM = "<UDIM>"
 DATA = "Non-Color"
-"""Colour space of numbers that are no colours."""
+"""Colour space of data that are not colours."""
 
 
 def load_image(
@@ -91,7 +91,7 @@ def load_parts(
 
 
 def image_name(room: str, path: Path | str) -> str:
-    """What an image file of a room is called: 'kitchen base color', so that two rooms in one file are told apart."""
+    """Blender's name for an image file of a room: 'kitchen base color', to distinguish two rooms in one file."""
     label = Path(path).stem.replace("_", " ")
     return f"{cut(room, LONGEST - 8) or 'room'} {label}"
 

@@ -53,7 +53,7 @@ def import_mesh(path: Path) -> RawMesh:
 
 
 def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
-    """Run Blender's importer on a copy of `path`, naming nothing else; how each 'part N' of it is called and lies."""
+    """Run Blender's importer on a copy of `path` that refers to no other file; name and transform of each 'part N'."""
     with in_window(scene):
         try:
             if path.suffix.lower() == ".obj":
@@ -68,7 +68,7 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
                 addon_utils.enable("io_scene_gltf2")
             bpy.ops.import_scene.gltf(filepath=str(copy), import_shading="FLAT", merge_vertices=False)
             return placed
-        except (RuntimeError, AttributeError) as error:  # how an operator tells of anything that went wrong
+        except (RuntimeError, AttributeError) as error:  # how an operator reports any failure
             raise BadInputError(
                 f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
             ) from error

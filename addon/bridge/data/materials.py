@@ -176,7 +176,7 @@ def texture(tree: bpy.types.NodeTree, image: bpy.types.Image, uv_map: str, **set
 
 
 def _connect(shader: bpy.types.ShaderNode) -> None:
-    """Make a node the surface of its material, last of all: Blender takes up what is seen of a tree after each change,
+    """Make a node the surface of its material, last of all: Blender updates what is used of a tree after each change,
     in a time that goes with the number of materials."""
     output = add_node(shader.id_data, "ShaderNodeOutputMaterial", location=(300, 0))
     feed(output.inputs[0], shader.outputs[0])

@@ -49,7 +49,7 @@ def each_object(
         indices = triangles.get(instance.object_id)
         if indices is None:
             continue
-        # Triangles that repeat a vertex are dropped by no one: they show nothing.
+        # Triangles that repeat a vertex are not dropped: they are invisible.
         vertex_ids, corners = np.unique(mesh.triangles[indices].ravel(), return_inverse=True)
         vertices = mesh.vertices[vertex_ids]
         centre = (vertices.min(0) + vertices.max(0)) / 2
@@ -67,6 +67,6 @@ def each_object(
 
 
 def is_open(data: bpy.types.Mesh) -> bool:
-    """Whether a mesh is a sheet: has edges with one face only."""
+    """Whether a mesh is open: has edges with one face only."""
     edges = read(data.loops, "edge_index", kind=np.int32)
     return bool((np.bincount(edges, minlength=len(data.edges)) == 1).any())

@@ -50,7 +50,7 @@ def find_node(owner: bpy.types.Material | bpy.types.World | None, kind: str) -> 
 
 
 def image_node(socket: bpy.types.NodeSocket) -> bpy.types.ShaderNode | None:
-    """The node whose image an input shows, through whatever lies between; None where it shows none."""
+    """The node whose image an input shows, directly or through other nodes; None where it shows none."""
     return next((node for node in _behind(socket, set()) if node.type == "TEX_IMAGE" and node.image), None)
 
 

@@ -1,4 +1,4 @@
-"""Blender's operators on a scene of our own, while all that is open stays as it is."""
+"""Running Blender's operators on a scene of our own, with the user's left unchanged."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext

@@ -161,7 +161,7 @@ def copies(
                 slot.material = plain_materials[old_slot.material]
         for material, name in zip(plain_materials, unique(map(own_name, plain_materials))):
             names.give("materials", plain_materials[material], name)
-        # By their first objects: one mesh may be worn by several.
+        # By their first objects: several may share one mesh.
         meshes = {copy.data: copy for copy in reversed(collection.objects) if copy.type == "MESH"}
         mesh_names = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
         for mesh, name in zip(meshes, unique(mesh_names)):
@@ -238,7 +238,7 @@ def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
 
 
 def textures_of(path: Path) -> str:
-    """Name of the folder for a file's pictures, beside it: no other file's, though its stem or ending be the same."""
+    """Name of the folder for a file's pictures, beside it; unique even if another file has the same stem or ending."""
     return f"{path.name} textures"
 
 
@@ -304,7 +304,7 @@ def own_name(datablock: bpy.types.ID) -> str:
 
 
 def unique(names: Iterable[str]) -> list[str]:
-    """The names, those after the first of their kind with a number: no two are one in USD, nor on any file system."""
+    """The names, repeated ones with a number appended: distinct in USD and on any file system."""
     taken, result = set(), []
     for name in names:
         candidate, number = name, 1

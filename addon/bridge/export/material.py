@@ -89,7 +89,7 @@ def plain_copy(
 
 
 def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:
-    """What formats get that know of no tiles: a tiled image and one tile's number, or the room's image and 0."""
+    """For formats without tiles: a tiled image and the number of one tile, or the room's image and 0."""
     if image.source != "TILED":
         return image, 0
     if len(tiles) == 1:

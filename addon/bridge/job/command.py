@@ -1,4 +1,4 @@
-"""How this add-on's command line is started as a process of its own from within Blender."""
+"""Command to start this add-on's command line as a separate process from within Blender."""
 
 import json
 import sys
@@ -25,10 +25,10 @@ sys.exit(main(told["arguments"]))
 
 
 def command(arguments: Sequence[str], **options: object) -> list[str]:
-    """The words of a command that runs `scan-relight ARGUMENTS`, with an option for each of `options` but for None.
+    """Program and arguments that run `scan-relight ARGUMENTS`, with an option for each of `options` that is not None.
 
     In Blender it is Blender itself, without a window and with factory settings, so that no preference, startup file or
-    other add-on has a say; packages are looked for where this process finds them. It has a lower priority.
+    other add-on has an effect; packages are looked for where this process finds them. It has a lower priority.
     """
     arguments = [str(argument) for argument in arguments]
     for name, value in options.items():

@@ -119,7 +119,7 @@ class Job:
         threading.Thread(target=self._end, name="scan relight stop", daemon=True).start()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for the end; whether it came."""
+        """Wait for the end; returns whether it came in time."""
         return self._finished.wait(timeout)
 
     def _end(self) -> None:

@@ -133,5 +133,5 @@ def write_recovered(recovery: Recovery | Refit, capture: Capture, fresh: bool) -
 
 
 def versions() -> dict[str, str]:
-    """What a report names of Scan Relight and Blender."""
+    """Versions of Scan Relight and Blender, for a report."""
     return {"scan_relight": VERSION, "blender": bpy.app.version_string}

@@ -1,4 +1,4 @@
-"""The recovered room in the open file. All of it comes out of the result's scene.blend: one code path makes the room.
+"""The recovered room in the open file. All of it is appended from the result's scene.blend: one code path makes rooms.
 
 A capture has one room in a file. Where it is there already, `bringing` updates it (`room.update`): what the artist did
 to it stays.
@@ -127,7 +127,7 @@ def bringing(
 
 
 def ready(scene: bpy.types.Scene) -> None:
-    """Show the camera that a scene is looked through; without the update no matrix_world is right before it is."""
+    """Show the scene's active camera and update its view layer, as every matrix_world is out of date until then."""
     if scene.camera is not None:
         show_camera(scene, scene.camera)
     scene.view_layers[0].update()
@@ -168,7 +168,7 @@ def _replace_images(added: AddedData, top: bpy.types.Collection) -> None:
 
 
 def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, list[str]]:
-    """Have the room in `scene`, or in one of its own: the scene to see it in, and what stays as the artist has it."""
+    """Put the room into `scene`, or one of its own; returns the scene that shows it, and what stays the artist's."""
     messages: list[str] = []
     room_scene = None if new else own_scene(top)
     if room_scene is not None:

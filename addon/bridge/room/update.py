@@ -1,4 +1,4 @@
-"""A room that is in the file already becomes that of a new result; what the artist did to it stays."""
+"""Updates a room that is in the file from a new result; the artist's changes stay."""
 
 import json
 from collections.abc import Generator, Iterable
@@ -26,7 +26,7 @@ KNOWN = "scan_relight_known"
 
 @dataclass
 class Pair:
-    """An object of the file and the one that takes its place or lends it its data."""
+    """An object of the file and the new one that it takes data from."""
 
     old: bpy.types.Object
     new: bpy.types.Object
@@ -50,7 +50,7 @@ class Steps:
 
 
 def key_of(obj: bpy.types.Object) -> str:
-    """What an object of a room is known by."""
+    """Key that identifies an object of a room across runs."""
     if OBJECT_ID in obj:
         return f"object {obj[OBJECT_ID]}"
     if obj.get(FRAME_INDEX) == NO_FRAME:
@@ -186,7 +186,7 @@ def _place(pair: Pair) -> None:
 
 
 def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
-    """Give an object the new mesh and material, but for what is the artist's."""
+    """Give an object the new mesh and material, except where the artist changed them."""
     old, new = pair.old, pair.new
     slot = next((candidate for candidate in old.material_slots if is_ours(candidate.material)), None)
     worn = slot.material if slot is not None else None
@@ -199,7 +199,7 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
             set_layer(data, layer.name, layer_of(new.data, layer.name)).active_render = layer.active_render
     else:
         if data not in meshes:
-            # The mesh of another duplicate stays another mesh.
+            # Duplicates with different meshes keep different meshes.
             meshes[data] = new.data.copy() if new.data in used else new.data
             used.add(meshes[data])
         fresh = meshes[data]
@@ -233,7 +233,7 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
 
 
 def _sort(obj: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:
-    """Put an object that became a lamp, or is none any more, into the other part, unless the artist moved it."""
+    """Move an object that became a lamp, or ceased to be one, to the other collection, unless the artist moved it."""
     parts = [
         collection
         for collection in obj.users_collection

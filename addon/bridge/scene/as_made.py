@@ -55,7 +55,7 @@ def is_renamed(obj: bpy.types.Object) -> bool:
 
 
 def made_at(obj: bpy.types.Object) -> Matrix:
-    """The own matrix that an object was made with."""
+    """The `matrix_basis` that an object was made with."""
     values = list(obj[PLACE])
     return Matrix([values[k : k + 4] for k in range(0, 16, 4)])
 
@@ -85,7 +85,7 @@ def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:
     nodes = {key.partition("\n")[0] for key in current}
     for key in _state(owner):
         original.pop(key, None)
-    # A socket that is gone from a node that is there went with a version of Blender.
+    # If the node is there but not the socket, another version of Blender removed it.
     return any(
         key.partition("\n")[0] not in nodes or key in current and current[key] != value
         for key, value in original.items()

@@ -27,9 +27,9 @@ def new_room(capture_folder: Path | str) -> bpy.types.Collection:
 
 
 def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
-    """Close the eye of the cameras' part in a scene: as many cameras as frames would hide the room.
+    """Hide the cameras' collection in a scene (its eye icon): as many cameras as frames would cover the room.
 
-    The eye and not "disabled in viewports", under which Blender would not even tell where a camera stands.
+    Not "disabled in viewports": Blender would then not even update the cameras' matrices.
     """
     part = part_of(top, CAMERAS)
     for layer in scene.view_layers:
@@ -43,12 +43,12 @@ def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
 
 
 def scene_name(capture_folder: Path | str) -> str:
-    """What the scene is called that is made for a capture's room."""
+    """Name of the scene that is made for a capture's room."""
     return f"Scan Relight: {Path(capture_folder).name}"
 
 
 def part_of(top: bpy.types.Collection, name: str) -> bpy.types.Collection:
-    """One of a room's parts; the room's own collection where the artist took it away."""
+    """One of a room's parts; the room's own collection where the artist removed it."""
     return next((part for part in top.children_recursive if part.get(PART, part.name.split(".")[0]) == name), top)
 
 

@@ -49,7 +49,7 @@ def _build(
     median_radiance: float,
     parts: "Parts | None",
 ) -> tuple[list[bpy.types.Image], tuple[str, ...]]:
-    """Make an empty scene that of the room; returns the images that it refers to, and warnings."""
+    """Build the room in an empty scene; returns the images that it refers to, and warnings."""
     images = {
         name: load_image(folder / name, image_name(capture.root.name, name), keep=name != ENVIRONMENT)
         for name in (BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT)
@@ -97,7 +97,7 @@ def _build(
 
 
 def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.types.Object]:
-    """What is bright behind openings, as panels that shine into the room, unseen by cameras; linked to a collection."""
+    """Light from behind openings, as panels that emit into the room, invisible to cameras; linked to a collection."""
     panels = []
     for number, (corners, radiance) in enumerate(openings_of(folder), 1):
         vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
