@@ -7,7 +7,7 @@ import numpy as np
 from .atlas import Atlas
 from .model import Mesh
 from .params import CREASES
-from .two_sides import fronts, other_way
+from .two_sides import flipped, fronts
 from .weld import one_place, welded
 
 
@@ -20,7 +20,7 @@ def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
         single, sheet = fronts(mesh)
         either = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
         angle = edge_angles(single, either)
-        return np.concatenate([angle, other_way(angle[mesh.backs])])
+        return np.concatenate([angle, flipped(angle[mesh.backs])])
     points, faces, _ = welded(mesh, one_place(mesh.vertices))
     if wanted is not None:
         # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.

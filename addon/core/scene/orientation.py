@@ -9,7 +9,7 @@ from .model import Camera, Mesh
 from .params import SIDES
 from .rays import RayScene
 from .sparse_hits import pixel_edges, sparse_hits
-from .two_sides import two_sided, worth_it
+from .two_sides import substantial, two_sided
 
 
 class Sides(NamedTuple):
@@ -55,6 +55,6 @@ def seen_sides(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
     both = sides.min(0) >= np.maximum(SIDES.least_share * sides.sum(0), SIDES.least_rays)
     if sides[0].any() and sides[1].any():
         sheets, turned = two_sided(mesh, sides)
-        both = worth_it(mesh, both | sheets)
+        both = substantial(mesh, both | sheets)
         sign = np.where(both & sheets, turned, sign)
     return Sides(sign.astype(np.float32), footprint, both)

@@ -98,7 +98,7 @@ class SampleCollector:
 
     def result(self) -> Samples:
         """All of it, ordered by element, then frame."""
-        names = [one.name for one in fields(Samples)]
-        together = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
-        order = np.lexsort((together["frame"], together["element"]))
-        return Samples(**{name: values[order] for name, values in together.items()})
+        names = [field.name for field in fields(Samples)]
+        columns = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
+        order = np.lexsort((columns["frame"], columns["element"]))
+        return Samples(**{name: values[order] for name, values in columns.items()})
