@@ -22,9 +22,9 @@ def make_report(run: Corrected) -> dict[str, Any]:
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
         "passes_of_packages": [
-            {"name": one.name, "stage": one.stage, "package": one.origin or of_thing(one.run)}
+            {"name": item.name, "stage": item.stage, "package": item.origin or of_thing(item.run)}
             for stage in run.done
-            for one in following(stage, run.settings.without)
+            for item in following(stage, run.settings.without)
         ],
         "warnings": [*run.capture.warnings, *map(_done_anew, run.store.damaged), *run.read.bad],
     }
@@ -99,14 +99,14 @@ def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) ->
         warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
     if not lit.radiance[lit.seen].any():
         warnings.append("Every frame is black; nothing can be said of any albedo.")
-    found = run.observed().calibration
-    if found.calibrated.any():
-        exposure = np.log2(found.gain[found.calibrated].mean(1))
+    calibration = run.observed().calibration
+    if calibration.calibrated.any():
+        exposure = np.log2(calibration.gain[calibration.calibrated].mean(1))
         figures |= {
-            "calibrated_frames": int(found.calibrated.sum()),
+            "calibrated_frames": int(calibration.calibrated.sum()),
             "exposure_range_stops": float(np.ptp(exposure)),
-            "calibration_spread": float(found.spread),
-            "mean_white_balance": np.exp(np.log(found.gain[found.calibrated]).mean(0)).tolist(),
+            "calibration_spread": float(calibration.spread),
+            "mean_white_balance": np.exp(np.log(calibration.gain[calibration.calibrated]).mean(0)).tolist(),
         }
     poses = run.poses()
     if np.isfinite(poses.shift):
@@ -139,8 +139,8 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
     escaped = float(shading.escaped[lit.seen].mean())
     # Before the specular part is known; a clipped element has no quotient.
     rho, valid = quotient(lit.radiance, shading.irradiance)
-    told = without_emitters(run.surface().atlas, lit.seen & (lit.tier != SATURATED), shading.emitters)
-    above = above_one(rho, told & valid)
+    measurable = without_emitters(run.surface().atlas, lit.seen & (lit.tier != SATURATED), shading.emitters)
+    above = above_one(rho, measurable & valid)
     figures |= {
         "escaped_share": escaped,
         "albedo_above_one_share": above,
@@ -154,7 +154,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         sun = shading.sun
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
-    names = {one.object_id: one.name for one in run.capture.instances}
+    names = {instance.object_id: instance.name for instance in run.capture.instances}
     warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
     warnings += shading.notes
     if above > MISSING.alarm:
@@ -162,7 +162,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
             f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."
         )
-    figures["unlit_share"] = float((told & ~valid).sum() / max(lit.seen.sum(), 1))
+    figures["unlit_share"] = float((measurable & ~valid).sum() / max(lit.seen.sum(), 1))
     if figures["unlit_share"] > 0.001:
         warnings.append(
             f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."

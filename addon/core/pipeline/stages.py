@@ -47,7 +47,7 @@ from .stage import Stage
 STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
 """Those that are stored, in their order."""
 ELEMENT_BYTES: Block[int] = 300
-"""At least, that the stages after the surface take for each element: in three rooms 400 to 500, with all besides."""
+"""Lower bound of what the stages after the surface take for each element: in three rooms 400 to 500 in all."""
 Arrays = dict[str, np.ndarray]
 Stored = tuple[Arrays, dict[str, Any]]
 T = TypeVar("T")
@@ -109,7 +109,7 @@ class Stages:
         self.log: dict[str, dict[str, Any]] = {}
 
     def _taken(self, capture: Capture, settings: Settings) -> Capture:
-        """A capture with the frames that are looked at."""
+        """A capture with the frames that are used."""
         if "frame-choice" in settings.without or "lit_diffuse" in settings.published:
             return capture
         return with_frames_that_add(capture, settings.threads)
@@ -130,18 +130,18 @@ class Stages:
         for stage in STAGES:
             given: tuple[Any, ...] = ()
             if stage is specular.STAGE:
-                brdfs = {one.brdf for one in overrides.lobes().values() if one.brdf is not None}
+                brdfs = {lobe.brdf for lobe in overrides.lobes().values() if lobe.brdf is not None}
                 given = (*overrides.lobes_key(), *sorted(filter(None, map(brdf_origin, brdfs))))
             keys[stage.name] = stage.key(self.settings, keys, *given) if stage.takes else self._first_key(stage)
         return keys
 
     def _first_key(self, stage: Stage) -> str:
-        others = tuple(filter(None, (readers.origin(self._as_read.format), self._laid_out_by)))
-        return stage.key(self.settings, {}, fingerprint(self._as_read), *others)
+        origins = tuple(filter(None, (readers.origin(self._as_read.format), self._laid_out_by)))
+        return stage.key(self.settings, {}, fingerprint(self._as_read), *origins)
 
     @cached_property
     def _laid_out_by(self) -> str:
-        """What lays out the atlas; where that is not told, as what is stored is only looked at: what did."""
+        """What lays out the atlas; what did, where that is not given as stored results are only read."""
         if self._unwrap is not None:
             return surface.laid_out_by(self._unwrap)
         return str(self.store.stored_meta(surface.STAGE.name).get("unwrap", ""))
@@ -149,11 +149,11 @@ class Stages:
     @property
     def run_key(self) -> str:
         """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
-        told: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
-        told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
-        told += () if self.settings.texture_fill else ("no texture fill",)
-        told += left_out_of(WRITE, self.settings.without)
-        return key("run", self.keys[specular.STAGE.name], *told)[:16]
+        parts: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
+        parts += () if self.settings.atlas == ROOM else (self.settings.atlas,)
+        parts += () if self.settings.texture_fill else ("no texture fill",)
+        parts += left_out_of(WRITE, self.settings.without)
+        return key("run", self.keys[specular.STAGE.name], *parts)[:16]
 
     def _stage(
         self,
@@ -191,7 +191,7 @@ class Stages:
         return self._stage(
             surface.STAGE,
             lambda settings: surface.make_surface(capture, self._needed_unwrap(), settings),
-            lambda found: surface.to_store(found, capture.mesh, self._laid_out_by),
+            lambda result: surface.to_store(result, capture.mesh, self._laid_out_by),
             lambda arrays, meta: surface.from_store(arrays, meta, capture.mesh),
         )
 
@@ -227,8 +227,8 @@ class Stages:
     def room_poses(self) -> Poses:
         """Where the frames were found to be, in the capture's coordinates."""
         poses = self.poses().camera_to_world.copy()
-        for pose, was, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
-            pose[:3, 3] += was.camera.centre - near.camera.centre
+        for pose, original, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
+            pose[:3, 3] += original.camera.centre - near.camera.centre
         return replace(self.poses(), camera_to_world=poses)
 
     def observed(self) -> Observed:
@@ -250,7 +250,7 @@ class Stages:
         return self._stage(
             frames.STAGE,
             observe,
-            lambda found: (found.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
+            lambda observed: (observed.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
             from_store,
         )
 
@@ -273,31 +273,31 @@ class Stages:
     def shading(self) -> Shading:
         """Lamps and irradiance."""
         room, observed, first = self.surface(), self.observed(), shading.STAGE.name not in self.done
-        found = self._stage(
+        result = self._stage(
             shading.STAGE,
             lambda settings: shading.find_shading(self._near, room, observed, settings, self.progress),
             shading.to_store,
             shading.from_store,
         )
-        if first and len(found.patches):
-            self.done[surface.STAGE.name] = found.patches.surface(room)
-            self.capture, self._near = found.patches.capture(self.capture), found.patches.capture(self._near)
-        return found
+        if first and len(result.patches):
+            self.done[surface.STAGE.name] = result.patches.surface(room)
+            self.capture, self._near = result.patches.capture(self.capture), result.patches.capture(self._near)
+        return result
 
     @cached_property
     def field(self) -> LightField:
         """The room as a light source, with all that was found of its light."""
-        found = self.shading()
-        return shading.lit_room(self.surface(), found)
+        light = self.shading()
+        return shading.lit_room(self.surface(), light)
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
         self.shading()
-        found = self._stage(
-            specular.STAGE, self.fitted, lambda found: found.to_store(self.overrides), Specular.from_store
+        result = self._stage(
+            specular.STAGE, self.fitted, lambda result: result.to_store(self.overrides), Specular.from_store
         )
         self.store.drop(self.store.parts(specular.STAGE.name))  # they are in it
-        return found
+        return result
 
     def specular_block(self, block: tuple[int, int]) -> None:
         """Store what is found of some of the objects, which `specular` begins with: the I-th of N parts, I from 1."""
@@ -307,19 +307,19 @@ class Stages:
         if self.store.stored_key(name) == key:
             return
         self.progress.stage(specular.STAGE.name)
-        found = look_at_block(self._room(settings), block)
+        looked = look_at_block(self._room(settings), block)
         arrays: Arrays = {}
-        self.store.save(name, key, arrays, {"looked": packed(found, arrays)})
+        self.store.save(name, key, arrays, {"looked": packed(looked, arrays)})
         self.progress.done()
 
     def _looked(self) -> dict[int, Looked]:
         """What blocks of objects have stored."""
-        found: dict[int, Looked] = {}
+        looked: dict[int, Looked] = {}
         for name in self.store.parts(specular.STAGE.name):
             arrays = self.store.load(name, self.keys[specular.STAGE.name])
             if arrays is not None:
-                found |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
-        return found
+                looked |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
+        return looked
 
     def _room(self, settings: Settings) -> Room:
         light, names = self.shading(), [frame.name for frame in self.capture.frames]

@@ -32,7 +32,7 @@ def lit_diffuse(
         if also is not None:
             also(index, view, pixels, seen)
 
-    found = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
-    share = (clipped / np.maximum(found.count, 1)).astype(np.float32)
-    tier = np.where(found.count == 0, -1, np.where(share == 1, SATURATED, CLEAN)).astype(np.int8)
-    return LitDiffuse(found.median, found.interquartile_range, found.count, tier, share)
+    medians = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
+    share = (clipped / np.maximum(medians.count, 1)).astype(np.float32)
+    tier = np.where(medians.count == 0, -1, np.where(share == 1, SATURATED, CLEAN)).astype(np.int8)
+    return LitDiffuse(medians.median, medians.interquartile_range, medians.count, tier, share)

@@ -54,5 +54,7 @@ def albedo_of(
     """
     rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
     valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
-    found = fill(atlas, rho, valid, class_names(instances), emitters)
-    return replace(found, error=np.where(found.origin == MEASURED, relative_error(lit, atlas.object_id), found.error))
+    albedo = fill(atlas, rho, valid, class_names(instances), emitters)
+    return replace(
+        albedo, error=np.where(albedo.origin == MEASURED, relative_error(lit, atlas.object_id), albedo.error)
+    )
