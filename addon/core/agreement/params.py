@@ -1,4 +1,4 @@
-"""How it is told whether frames and mesh fit."""
+"""How it is decided whether frames and mesh fit."""
 
 from dataclasses import dataclass
 
@@ -55,7 +55,7 @@ AGREEMENT = AgreementParams()
 
 @dataclass(frozen=True)
 class MisalignmentParams:
-    """Of `misalignment`: how far frames lie beside the mesh.
+    """Of `misalignment`: how far frames are displaced from the mesh.
 
     Attributes
     ----------

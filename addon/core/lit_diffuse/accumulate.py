@@ -96,25 +96,25 @@ def accumulate(
     """
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
-    wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
+    order, frame_bytes = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
 
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene)
         pixels = pixels if change is None else change(frame, view, pixels)
-        known = groups.seen(frame.camera, pixels.valid)
-        asked = groups.candidates(view) if known is None else known
-        asked = asked if only is None else asked[only[asked]]
-        found = observe(view, pixels, atlas, scene, asked, free=known is not None)
-        if known is None and only is None and change is None:
-            groups.remember(frame.camera, pixels.valid, found.element)
-        return int(index), view, pixels, found
+        remembered = groups.seen(frame.camera, pixels.valid)
+        elements = groups.candidates(view) if remembered is None else remembered
+        elements = elements if only is None else elements[only[elements]]
+        observations = observe(view, pixels, atlas, scene, elements, free=remembered is not None)
+        if remembered is None and only is None and change is None:
+            groups.remember(frame.camera, pixels.valid, observations.element)
+        return int(index), view, pixels, observations
 
     with ExitStack() as stack:
         for estimator in estimators.values():
             stack.callback(estimator.close)
-        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads, each=each)):
+        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, order, threads, each=frame_bytes)):
             tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)
@@ -122,5 +122,5 @@ def accumulate(
             if also is not None:
                 also(index, view, pixels, seen)
             if progress is not None:
-                progress.update(0.9 * (done + 1) / len(wanted))
+                progress.update(0.9 * (done + 1) / len(order))
         return _choose(lambda tier: estimators[tier].result())

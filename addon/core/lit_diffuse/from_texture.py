@@ -64,9 +64,9 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     picture[of_triangle], number[of_triangle] = lit.picture, lit.tile
     for part in _runs(picture[tiles], max(TEXELS_AT_ONCE // lit.size**2, 1)):
         texels = _read(lit, int(picture[tiles[part.start]]), number[tiles[part]])
-        own = order[first[part.start] : ends[part.stop - 1]]
-        local = np.searchsorted(tiles[part], key[own])
-        sums[own] = _window_sums(texels, local, place[own] * lit.size, width[own], lit.size)
+        elements = order[first[part.start] : ends[part.stop - 1]]
+        local = np.searchsorted(tiles[part], key[elements])
+        sums[elements] = _window_sums(texels, local, place[elements] * lit.size, width[elements], lit.size)
         if progress is not None:
             progress.update(0.9 * part.stop / len(tiles))
     if not sums[:, 3].any():
@@ -117,13 +117,13 @@ def interpolated(corner: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray
     return (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
 
 
-def _runs(picture: np.ndarray, most: int) -> list[slice]:
+def _runs(picture: np.ndarray, maximum: int) -> list[slice]:
     """Slices of at most so many tiles, each within one picture."""
     ends = [*(np.flatnonzero(np.diff(picture)) + 1).tolist(), len(picture)]
     return [
         slice(first + part.start, first + part.stop)
         for first, end in pairwise([0, *ends])
-        for part in blocks(end - first, most)
+        for part in blocks(end - first, maximum)
     ]
 
 
@@ -135,8 +135,8 @@ def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
     except (OSError, ValueError) as error:
         raise BadInputError(f"Texture '{path}' changed during the run; start again.") from error
     across = side // size
-    whole = stored[: across * size, : across * size].reshape(across, size, across, size, 3)
-    return whole[number // across, :, number % across].astype(np.float32)
+    tiles = stored[: across * size, : across * size].reshape(across, size, across, size, 3)
+    return tiles[number // across, :, number % across].astype(np.float32)
 
 
 def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width: np.ndarray, size: int) -> np.ndarray:
@@ -145,13 +145,13 @@ def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width
     Their `centre` ((n, 2) x and y) and `width` ((n,)) are in texels; they are moved to lie within the tile ((n,) int).
     """
     known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
-    over = np.isposinf(texels).any(-1)
-    known |= over
+    infinite = np.isposinf(texels).any(-1)
+    known |= infinite
     values = np.concatenate(
         [
             np.where(known[..., None], np.minimum(texels, HALF_MAX), 0),
             known[..., None],
-            (known & (over | (texels >= HALF_MAX).any(-1)))[..., None],
+            (known & (infinite | (texels >= HALF_MAX).any(-1)))[..., None],
         ],
         -1,
         dtype=np.float64,

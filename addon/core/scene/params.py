@@ -1,4 +1,4 @@
-"""What the geometry is told: what counts as seen, as a side, as a crease, as noise."""
+"""Parameters of the geometry: what counts as seen, as a side, as a crease, as noise."""
 
 from dataclasses import dataclass
 
@@ -195,7 +195,7 @@ NOISE = NoiseParams()
 
 @dataclass(frozen=True)
 class SurfaceParams:
-    """How the surface is laid out in texels, and its parts told apart.
+    """How the surface is laid out in texels, and its parts are told apart.
 
     Attributes
     ----------
@@ -341,7 +341,7 @@ class ClosingParams:
     fine : int
         Parts of a cell's edge: a cell is closed of which one is open, 1.6 cm in a room.
     speck : int
-        Cells that hang together, of 4 cm in a room: no window is so small, and a hole that is shows black.
+        Connected cells, of 4 cm in a room: no window is so small, and a hole that is shows black.
     under : float
         Cells that a face lies at least under the scan's denoised border, as the two cover each other: 1 mm in a room.
     """

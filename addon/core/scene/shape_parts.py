@@ -239,7 +239,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     rank[order] = np.arange(len(order))
     part = rank[joined]
     named_planes = tuple(
-        replace(plane, part=int(part[first[k]]), name=_name(plane, faces, gap))
+        replace(plane, part=int(part[first[plane_piece]]), name=_name(plane, faces, gap))
         for plane_piece, plane in zip(piece_of_plane, planes, strict=True)
     )
     return Parts(part, {plane.part: plane.name for plane in named_planes if plane.name}, named_planes)

@@ -25,19 +25,20 @@ def flipped(corners: np.ndarray) -> np.ndarray:
 def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles of the sheets that are seen from both sides.
 
-    A sheet is what hangs together within an object, has a border, and has two sides at all. It is told as a whole:
-    of a shade, each triangle alone may be seen from one side only, these from within and those from without.
+    A sheet is what is connected within an object, has a border, and has two sides at all. It is judged as a whole:
+    of a shade, each triangle alone may be seen from one side only, some from within and some from without.
 
     Parameters
     ----------
     rays : (2, t) int
-        How many rays of the frames met the front, by the winding, and the back of each triangle.
+        How many rays of the frames hit the front, by the winding, and the back of each triangle.
 
     Returns
     -------
     both : (t,) bool
     sign : (t,) float32
-        There +1 or -1, so that the windings turned by it agree all over the sheet and show the side that is seen more.
+        On those triangles +1 or -1, so that the windings turned by it agree all over the sheet and show
+        the side that is seen more.
     """
     count = len(mesh.triangles)
     points, faces, _ = welded(mesh)

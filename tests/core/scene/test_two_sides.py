@@ -15,7 +15,7 @@ from addon.core.scene.model import Mesh
 from addon.core.scene.orientation import seen_sides
 from addon.core.scene.rays import RayScene
 from addon.core.scene.surface import build_surface
-from addon.core.scene.two_sides import fronts, laid_apart, two_sided, with_backs, substantial
+from addon.core.scene.two_sides import fronts, laid_apart, substantial, two_sided, with_backs
 from tests.core.rooms import DARK, box_sides, look_at, make_room, quad
 
 ROUND = 24

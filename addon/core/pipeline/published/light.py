@@ -48,9 +48,9 @@ def albedo_of(
     emitters: set[int],
     specular: np.ndarray | float = 0.0,
 ) -> Albedo:
-    """The quotient as it is, clamped at 1; what has none takes its object's albedo. Parameters as `albedo.albedo_of`.
+    """The quotient as it is, clamped at 1; elements without one take their object's albedo.
 
-    The error is that of the median.
+    Parameters as of `albedo.albedo_of`. The error is that of the median.
     """
     rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
     valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
