@@ -28,15 +28,15 @@ class Budget:
     def __init__(self) -> None:
         self.limit = 0
 
-    def fitting(self, most: int, each: int) -> int:
-        """How many of up to `most` pieces of `each` bytes may be in memory at once; at least one.
+    def fitting(self, maximum: int, each: int) -> int:
+        """How many of up to `maximum` pieces of `each` bytes may be in memory at once; at least one.
 
         They may take half of what is left: the rest is for what is made of them.
         """
         used = resident_memory()
         if not self.limit or not each or used is None:
-            return most
-        return max(1, min(most, (self.limit - used) // 2 // each))
+            return maximum
+        return max(1, min(maximum, (self.limit - used) // 2 // each))
 
     def ask(self, need: int, what: str) -> None:
         """Before long work: raise `MemoryLimitError` where what is left is less than that surely needs, in bytes."""

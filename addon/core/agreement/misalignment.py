@@ -25,9 +25,9 @@ def predicted(index: int, views: Sequence[SmallView], mesh_views: Sequence[MeshV
     for row, j in enumerate(nearest):
         inside, pixels = sees(views[j].camera, points, scene, margin=1)
         values[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
-    enough = np.isfinite(values).sum(0) >= 2
+    well_seen = np.isfinite(values).sum(0) >= 2
     image = np.full(camera.height * camera.width, np.nan, np.float32)
-    image[hit[enough]] = np.nanmedian(values[:, enough], 0)
+    image[hit[well_seen]] = np.nanmedian(values[:, well_seen], 0)
     return image.reshape(camera.height, camera.width)
 
 

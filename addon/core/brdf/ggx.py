@@ -46,10 +46,10 @@ def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.
     x, y, z, t1x, t1y = (c[:, None] for c in (x, y, z, t1x, t1y))
     radius, angle = np.sqrt(square[0]), np.float32(2 * np.pi) * square[1]
     p1, p2 = radius * np.cos(angle), radius * np.sin(angle)
-    rest = 1 - p1 * p1
+    chord_square = 1 - p1 * p1
     s = (1 + z) / 2
-    p2 = (1 - s) * np.sqrt(rest) + s * p2
-    up = np.sqrt(np.maximum(rest - p2 * p2, 0))
+    p2 = (1 - s) * np.sqrt(chord_square) + s * p2
+    up = np.sqrt(np.maximum(chord_square - p2 * p2, 0))
     alpha = np.float32(phi)
     h = np.stack([
         alpha * (p1 * t1x + p2 * t2x + up * x),

@@ -32,13 +32,13 @@ def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
 
     def take(kind: int) -> np.ndarray:
         """Put what is to be taken of another tier into `best`; gives that tier's counts."""
-        other = summary(kind)
-        beaten = (clean < VISIBILITY.enough) & (other.count >= clean) if kind == EDGE else tier < 0
-        chosen = beaten & (other.count > 0)
+        summary_of_tier = summary(kind)
+        beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean) if kind == EDGE else tier < 0
+        chosen = beaten & (summary_of_tier.count > 0)
         tier[chosen] = kind
         for name in ("median", "lower", "upper", "count"):
-            getattr(best, name)[chosen] = getattr(other, name)[chosen]
-        return other.count
+            getattr(best, name)[chosen] = getattr(summary_of_tier, name)[chosen]
+        return summary_of_tier.count
 
     edge, saturated = take(EDGE), take(SATURATED)
     clipped = saturated / np.maximum(clean + edge + saturated, 1)
@@ -114,13 +114,13 @@ def accumulate(
     with ExitStack() as stack:
         for estimator in estimators.values():
             stack.callback(estimator.close)
-        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, order, threads, each=frame_bytes)):
-            tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
+        for done, (index, view, pixels, observations) in enumerate(ordered_map(look, order, threads, each=frame_bytes)):
+            tiers = observations.tier if edge_tier else np.where(observations.tier == EDGE, CLEAN, observations.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)
-                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
+                estimator.add(observations.element.take(chosen), observations.radiance.take(chosen, 0))
             if also is not None:
-                also(index, view, pixels, seen)
+                also(index, view, pixels, observations)
             if progress is not None:
                 progress.update(0.9 * (done + 1) / len(order))
         return _choose(lambda tier: estimators[tier].result())

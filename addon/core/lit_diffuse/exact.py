@@ -89,9 +89,9 @@ class Exact:
         sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
         bucket_bytes = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
         summaries = ordered_map(self._summarise, range(self._buckets), self._threads, each=bucket_bytes)
-        for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), summaries, strict=True):
+        for part, (quartiles, counts) in zip(blocks(self._count, self.BUCKET), summaries, strict=True):
             lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)
-            count[part] = seen
+            count[part] = counts
         self.close()
         return Summary(median, lower, upper, count)
 

@@ -62,10 +62,10 @@ def lit_diffuse(
         view = view_frame(frames[index].camera, mesh, scene)
         return index, view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
-    for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads, each=frame_bytes):
-        median.add(seen.element, seen.radiance)
+    for index, view, pixels, observations in ordered_map(look, range(len(frames)), threads, each=frame_bytes):
+        median.add(observations.element, observations.radiance)
         if also is not None:
-            also(index, view, pixels, seen)
+            also(index, view, pixels, observations)
         if progress is not None:
             progress.update((index + 1) / len(frames))
     return median.result()

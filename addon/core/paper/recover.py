@@ -84,7 +84,7 @@ def recover(
     collector = SampleCollector(atlas, len(frames), seed)
     L_d = lit_diffuse(
         surface.mesh, atlas, surface.scene, frames, read, threads=threads,
-        also=lambda index, view, pixels, seen: collector.add(index, seen),
+        also=lambda index, view, pixels, observations: collector.add(index, observations),
     ).median  # fmt: skip
     light = CapturedLight(surface.mesh, atlas, surface.scene, L_d, outside)
     S, _ = irradiance(light, atlas.position, atlas.normal, rays, threads=threads, seed=seed)

@@ -146,24 +146,24 @@ def look_at(
     return {object_id: results[object_id] for object_id in wanted}
 
 
-def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
+def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     """Choose a model for each object, by what its frames and its class say; of those that are given, by that alone.
 
     Parameters
     ----------
-    found : mapping of int to Looked
+    looks : mapping of int to Looked
         What `look_at` found of each of them.
     """
-    choices = {i: looked.choice for i, looked in found.items()}
-    problems = {i: looked.problem for i, looked in found.items() if looked.problem is not None}
-    targets = {i: looked.target for i, looked in found.items()}
+    choices = {i: looked.choice for i, looked in looks.items()}
+    problems = {i: looked.problem for i, looked in looks.items() if looked.problem is not None}
+    targets = {i: looked.target for i, looked in looks.items()}
     if "class-lobes" not in room.settings.without:
         # That two parts are walls by their shape says nothing of what they are painted with.
         named_ids = {instance.object_id for instance in room.instances if not instance.guess}
         reflecting = {i: choice for i, choice in choices.items() if i in named_ids and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
-    order = sorted(found, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
+    order = sorted(looks, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
     intervals = ordered_map(
         lambda i: gloss_interval(choices[i], problems.get(i)), order, room.settings.threads, ahead=len(order)
     )

@@ -102,13 +102,13 @@ class Corrected(Stages):
         The objects `without` get none; by default the lamps that were found.
         """
         shading = self.shading()
-        atlas, lit = self.surface().atlas, self.lit_diffuse()
+        atlas, lit_diffuse = self.surface().atlas, self.lit_diffuse()
         without = shading.emitters if without is None else without
         if "shading" in self.settings.published:
-            return published_light.albedo_of(atlas, lit, irradiance, self.capture.instances, without, specular)
+            return published_light.albedo_of(atlas, lit_diffuse, irradiance, self.capture.instances, without, specular)
         return albedo_of(
             atlas,
-            lit,
+            lit_diffuse,
             irradiance,
             shading.relative_error,
             self.capture.instances,

@@ -177,13 +177,13 @@ class Passes:
         )  # fmt: skip
 
     def sharpened(
-        self, lit: LitDiffuse, frames: Sequence[Frame], progress: Progress | Rounds, **options: Any
+        self, lit_diffuse: LitDiffuse, frames: Sequence[Frame], progress: Progress | Rounds, **options: Any
     ) -> LitDiffuse:
         """L_d with its detail given back; `options` and errors as of `sharpen.sharpened`."""
         s = self.settings
         return sharpened(
-            lit, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads, folder=self.folder,
-            progress=progress, **options,
+            lit_diffuse, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads,
+            folder=self.folder, progress=progress, **options,
         )  # fmt: skip
 
     def once(self, frames: Sequence[Frame], poses: Poses, progress: Progress | Rounds) -> Observed:
@@ -200,16 +200,16 @@ class Passes:
         sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
         collector = SampleCollector(self.surface.atlas, len(frames), self.settings.seed, self.surface.mesh.geometry[0])
 
-        def also(index, view, pixels, seen):
+        def also(index, view, pixels, observations):
             sky.add(view, pixels)
-            collector.add(index, seen, view)
+            collector.add(index, observations, view)
 
-        lit = self.lit_diffuse(frames, progress, also)
-        if not lit.seen.any():
+        lit_diffuse = self.lit_diffuse(frames, progress, also)
+        if not lit_diffuse.seen.any():
             raise BadInputError(
                 "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
             )
-        return Observed(lit, sky.result(), collector.result(), poses, Calibration.none(len(frames)))
+        return Observed(lit_diffuse, sky.result(), collector.result(), poses, Calibration.none(len(frames)))
 
     def all(self, frames: Sequence[Frame], progress: Progress) -> Observed:
         """What `once` finds with the poses as read, or refined; errors as there."""
@@ -225,13 +225,15 @@ class Passes:
             rounds.next()
         observed = self.once(frames, Poses.as_read(frames), rounds)
         if settings.refine_poses and "pose-refinement" not in settings.without:
-            lit = observed.lit_diffuse
+            lit_diffuse = observed.lit_diffuse
             room = LightField(
-                surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), observed.environment,
+                surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit_diffuse.radiance), observed.environment,
                 lookup=surface.lookup,
             )  # fmt: skip
             rounds.next()
-            poses = refine_poses(frames, self.read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+            poses = refine_poses(
+                frames, self.read, Texture(room, lit_diffuse.seen), threads=settings.threads, progress=rounds
+            )
             del room
             give_back()
             observed = replace(observed, poses=poses)
@@ -240,8 +242,8 @@ class Passes:
                 observed = self.once(frames, poses, rounds)
         if settings.sharpen and "sharpening" not in settings.without:
             rounds.next()
-            lit = self.sharpened(observed.lit_diffuse, observed.poses.of(frames), rounds, groups=surface.groups)
-            observed = replace(observed, lit_diffuse=lit)
+            lit_diffuse = self.sharpened(observed.lit_diffuse, observed.poses.of(frames), rounds, groups=surface.groups)
+            observed = replace(observed, lit_diffuse=lit_diffuse)
         return replace(observed, calibration=calibration)
 
 
@@ -252,7 +254,7 @@ def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
     mesh = replace(capture.mesh, vertices=passes.surface.mesh.vertices)
     atlas, stored = passes.surface.atlas, mesh.lit
     if isinstance(stored, LitTexture):
-        lit = lit_from_picture(mesh, stored, atlas, progress)
+        lit_diffuse = lit_from_picture(mesh, stored, atlas, progress)
     else:
-        lit = lit_from_tiles(mesh, atlas, progress)
-    return Observed(lit, Environment.dark(), Samples.none(), Poses.as_read(()), Calibration.none(0))
+        lit_diffuse = lit_from_tiles(mesh, atlas, progress)
+    return Observed(lit_diffuse, Environment.dark(), Samples.none(), Poses.as_read(()), Calibration.none(0))

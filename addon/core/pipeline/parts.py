@@ -110,8 +110,8 @@ def scales(run: Corrected) -> dict[int, float]:
     }
     finer = {number: float(np.clip(surface.texel_size / texel, 1, PARTS.finest)) for number, texel in wanted.items()}
     finer = {number: scale for number, scale in finer.items() if scale > PARTS.worth}
-    taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
-    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > PARTS.most_texels:
+    texels = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
+    while finer and texels.sum() + sum((scale**2 - 1) * texels[i] for i, scale in finer.items()) > PARTS.most_texels:
         finer = {number: max(0.95 * scale, 1.0) for number, scale in finer.items()}
     return {number: scale for number, scale in finer.items() if scale > PARTS.worth}
 
@@ -222,10 +222,12 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
 
 def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
-    surface, lit, atlas = run.surface(), run.lit_diffuse(), closer.atlas
-    good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
-    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
-    room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
+    surface, lit_diffuse, atlas = run.surface(), run.lit_diffuse(), closer.atlas
+    good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
+    radiance_and_weight = np.concatenate([np.where(good[:, None], lit_diffuse.radiance, 0), good[:, None]], 1).astype(
+        np.float32
+    )
+    room = closer.sheet.image(surface.atlas.image(radiance_and_weight), _owner(run)).reshape(-1, 4)[atlas.texel]
     floor = np.float32(max(LEVELS.dark * run.median_radiance, 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)

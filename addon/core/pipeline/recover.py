@@ -69,13 +69,13 @@ class Recovery(Corrected):
     def write_images(self) -> dict[str, Any]:
         """Write the result folder's images, materials.json and report.html; returns the report that this shows."""
         self.look_closer()
-        lit = self.lit_diffuse()
+        lit_diffuse = self.lit_diffuse()
         # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
         images: dict[str, Callable[[], np.ndarray]] = {
             "albedo": lambda: self.albedo.rho,
             "base_color": self.base_color,
             "shading": lambda: self.irradiance,
-            "lit_diffuse": lambda: np.where(lit.seen[:, None], lit.radiance, np.float32(0)),
+            "lit_diffuse": lambda: np.where(lit_diffuse.seen[:, None], lit_diffuse.radiance, np.float32(0)),
             "coverage": self._coverage,
             "albedo_error": lambda: self.evidence.texels.albedo,
             "evidence": self.evidence.shares,
@@ -148,10 +148,10 @@ class Recovery(Corrected):
 
     def _coverage(self) -> np.ndarray:
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
-        lit = self.lit_diffuse()
+        lit_diffuse = self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance, 1e-30)
-        spread = lit.interquartile_range.mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
-        parts = (lit.count, spread, self.albedo.origin + CLOSED * self.closing)
+        spread = lit_diffuse.interquartile_range.mean(1) / np.maximum(np.nan_to_num(lit_diffuse.radiance).mean(1), dark)
+        parts = (lit_diffuse.count, spread, self.albedo.origin + CLOSED * self.closing)
         return np.stack([part.astype(np.float32) for part in parts], -1)
 
     def _write_openings(self) -> None:

@@ -52,7 +52,7 @@ class Result:
     report: dict[str, Any]
     materials: dict[str, Any]
     overrides: Overrides
-    asked: frozenset[int]
+    requested: frozenset[int]
 
     @property
     def settings(self) -> Settings:
@@ -68,7 +68,7 @@ class Result:
     def changed(self) -> set[int]:
         """Objects of which something else is given now, and those that are the same as one of them."""
         before = self.given
-        first = {i for i in before if before[i] != self.overrides.of(i).as_dict()} | self.asked
+        first = {i for i in before if before[i] != self.overrides.of(i).as_dict()} | self.requested
         return {i for i in before if {i, *self.overrides.chain(i)} & first}
 
 
@@ -179,7 +179,9 @@ class Refit(Recovery):
         changed = {
             i
             for i in self.touched
-            if before.get(i) != current.get(i) or i in self.result.asked and given[i] == self.overrides.of(i).as_dict()
+            if before.get(i) != current.get(i)
+            or i in self.result.requested
+            and given[i] == self.overrides.of(i).as_dict()
         }
         return {i for i in self.touched if {i, *self.overrides.chain(i)} & changed}
 

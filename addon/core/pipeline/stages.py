@@ -337,5 +337,5 @@ class Stages:
     @cached_property
     def median_radiance(self) -> float:
         """Median of L_d over all that was seen: what a picture's exposure is set by."""
-        lit = self.lit_diffuse()
-        return float(np.median(lit.radiance[lit.seen]))
+        lit_diffuse = self.lit_diffuse()
+        return float(np.median(lit_diffuse.radiance[lit_diffuse.seen]))

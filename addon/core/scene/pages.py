@@ -108,9 +108,9 @@ class Pages:
 
 def _weights(start: float, count: int, scale: float, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For `count` texels from `start` on: the room's texels to both sides, and how near each lies to the second."""
-    at = start + (np.arange(count) + 0.5) / scale - 0.5
-    low = np.floor(at + 1e-6).astype(np.int64)
-    share = np.clip(at - low, 0, 1).astype(np.float32)
+    coordinate = start + (np.arange(count) + 0.5) / scale - 0.5
+    low = np.floor(coordinate + 1e-6).astype(np.int64)
+    share = np.clip(coordinate - low, 0, 1).astype(np.float32)
     return np.clip(low, 0, size - 1), np.clip(low + 1, 0, size - 1), share
 
 
@@ -193,9 +193,9 @@ def lay_out(
     )
 
 
-def _by_block(island: np.ndarray, at: np.ndarray, object_id: np.ndarray) -> np.ndarray:
-    """Islands ((t,) int) with those of an object in one block, an edge of which is 1 in `at` ((t, 3, 2)), made one."""
-    low, high = (np.floor(edge) for edge in boxes(at, island))
+def _by_block(island: np.ndarray, block_uv: np.ndarray, object_id: np.ndarray) -> np.ndarray:
+    """Islands ((t,) int), those of an object in one block (of edge 1 in `block_uv`, (t, 3, 2)) made one."""
+    low, high = (np.floor(edge) for edge in boxes(block_uv, island))
     within = (low == high).all(1)
     first = np.unique(island, return_index=True)[1]
     place = np.concatenate([low, object_id[first, None]], 1)

@@ -63,14 +63,14 @@ class RadianceBeyond:
 
 def _visible(camera: Camera, points: np.ndarray, normals: np.ndarray):
     """Points ((n, 3)) that face a camera and lie within its image: indices, pixels, directions, distances."""
-    away = points - camera.centre
-    distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+    offset = points - camera.centre
+    distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
     xy, depth = camera.project(points)
-    facing = -(away * normals).sum(1) >= VISIBILITY.min_cosine * distance
+    facing = -(offset * normals).sum(1) >= VISIBILITY.min_cosine * distance
     inside = facing & (depth > 0) & (xy >= 0).all(1) & (xy < (camera.width, camera.height)).all(1)
     index = np.flatnonzero(inside)
     x, y = xy[index].astype(np.int64).T
-    return index, y * camera.width + x, (away[index] / distance[index, None]).astype(np.float32), distance[index]
+    return index, y * camera.width + x, (offset[index] / distance[index, None]).astype(np.float32), distance[index]
 
 
 def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, normals: np.ndarray, gap: float) -> Sight:
@@ -108,17 +108,17 @@ def colours(
     used, views = np.unique(sight.frame), np.zeros(len(points))
     log_radiance = np.full((len(used), len(points), 3), np.nan)
     for number, frame in enumerate(frames):
-        at, pixel, direction, distance = _visible(frame.camera, points, normals)
+        index, pixel, direction, distance = _visible(frame.camera, points, normals)
         hit = np.abs(scene.intersect(frame.camera.centre, direction).distance - distance) < gap
-        views[at[hit]] += 1
+        views[index[hit]] += 1
         row = int(np.searchsorted(used, number))
         if row == len(used) or used[row] != number:
             continue
         pixels = read(frame)
         log = np.log(np.maximum(pixels.radiance.reshape(-1, 3), FLOOR))
         invalid = ~pixels.valid.ravel() | pixels.saturated.ravel()
-        at, pixel = at[hit], pixel[hit]
-        log_radiance[row, at] = np.where(invalid[pixel, None], np.nan, log[pixel])
+        index, pixel = index[hit], pixel[hit]
+        log_radiance[row, index] = np.where(invalid[pixel, None], np.nan, log[pixel])
         observations = np.flatnonzero(sight.frame == number)
         value[observations] = np.where(
             pixels.valid.ravel()[sight.pixel[observations], None], log[sight.pixel[observations]], np.nan
@@ -129,8 +129,8 @@ def colours(
         level = _median(log_radiance - gain, 0)
         gain = np.nan_to_num(_median(log_radiance - level, 1))
     value -= gain[np.searchsorted(used, sight.frame), 0]
-    known = level.mean(-1)[np.isfinite(level).all(-1)]
-    bright = float(np.quantile(known, LEVELS.nearly_all)) if len(known) else np.nan
+    levels = level.mean(-1)[np.isfinite(level).all(-1)]
+    bright = float(np.quantile(levels, LEVELS.nearly_all)) if len(levels) else np.nan
     few_views = float(np.quantile(views[views > 0], 1 - LEVELS.nearly_all)) if views.any() else 0.0
     return RadianceBeyond(value, clipped, bright, few_views)
 

@@ -176,8 +176,8 @@ def with_strip(
             break
     square = size - strip.height
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
-    others = np.ones(len(uv), bool)
-    others[strip.triangle] = False
-    uv[others] = dense * (square / size)
+    is_dense = np.ones(len(uv), bool)
+    is_dense[strip.triangle] = False
+    uv[is_dense] = dense * (square / size)
     uv[strip.triangle] = (strip.uv + (0, square)) / size
     return uv, size, square, strip.crumbs._replace(corner=strip.crumbs.corner + (0, square))

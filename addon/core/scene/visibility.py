@@ -195,12 +195,12 @@ def _bilinear(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     y0 = np.clip(y.astype(np.int32), 0, height - 2)
     a, b = np.clip(x - x0, 0, 1).astype(np.float32), np.clip(y - y0, 0, 1).astype(np.float32)
     index = y0 * width + x0
-    beside, below, diagonal = index + 1, index + width, index + (width + 1)
+    right, below, diagonal = index + 1, index + width, index + (width + 1)
     not_a, not_b = 1 - a, 1 - b
     result = np.empty((len(x), 3), np.float32)
     for channel, plane in enumerate(np.ascontiguousarray(image.reshape(-1, 3).T)):
         top = plane.take(index) * not_a
-        top += plane.take(beside) * a
+        top += plane.take(right) * a
         bottom = plane.take(below) * not_a
         bottom += plane.take(diagonal) * a
         top *= not_b
@@ -250,23 +250,23 @@ def observe(
     x, y, inside = _projected(camera, offset)
     for position, extent in ((x, camera.width), (y, camera.height)):
         inside &= (position >= EDGE_MARGIN) & (position < extent - EDGE_MARGIN)
-    at = np.flatnonzero(inside)
-    x, y = x.take(at), y.take(at)
+    candidates = np.flatnonzero(inside)
+    x, y = x.take(candidates), y.take(candidates)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)
     visible_id = np.where(pixels.valid, view.object_id, NOTHING).ravel()
-    same_object = visible_id.take(pixel) == atlas.object_id.take(index.take(at))
+    same_object = visible_id.take(pixel) == atlas.object_id.take(index.take(candidates))
     if view.whole:
         same_object |= view.clean.ravel().take(pixel) & (visible_id.take(pixel) >= 0)
     keep = np.flatnonzero(same_object)
-    at = at.take(keep)
-    offset = np.stack([plane.take(at) for plane in offset])
+    candidates = candidates.take(keep)
+    offset = np.stack([plane.take(candidates) for plane in offset])
     distance = np.sqrt(_dot(offset, offset))
     direction = offset / -np.maximum(distance, np.float32(1e-12))
-    normal = atlas.normal.take(index.take(at), 0)
+    normal = atlas.normal.take(index.take(candidates), 0)
     angle = np.flatnonzero(_dot(direction, normal.T) >= VISIBILITY.min_cosine)
-    at, keep, normal = at.take(angle), keep.take(angle), normal.take(angle, 0)
-    index = index.take(at)
-    to_camera = np.empty((len(at), 3), np.float32)
+    candidates, keep, normal = candidates.take(angle), keep.take(angle), normal.take(angle, 0)
+    index = index.take(candidates)
+    to_camera = np.empty((len(candidates), 3), np.float32)
     for i in range(3):
         to_camera[:, i] = direction[i].take(angle)
     if not free:

@@ -27,10 +27,10 @@ def lit_diffuse(
     """L_d as `paper.lit_diffuse` has it, where all observations are of one kind; those clipped are counted beside."""
     clipped = np.zeros(len(atlas), np.int32)
 
-    def count(index: int, view: FrameView, pixels: Pixels, seen: Observations) -> None:
-        clipped[seen.element[seen.tier == SATURATED]] += 1
+    def count(index: int, view: FrameView, pixels: Pixels, observations: Observations) -> None:
+        clipped[observations.element[observations.tier == SATURATED]] += 1
         if also is not None:
-            also(index, view, pixels, seen)
+            also(index, view, pixels, observations)
 
     medians = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
     share = (clipped / np.maximum(medians.count, 1)).astype(np.float32)
