@@ -21,7 +21,7 @@ def one_line(sentence: str) -> str:
 
 
 class ScanRelightError(Exception):
-    """Base of every error that is told to the user in one sentence."""
+    """Base of every error that is shown to the user in one sentence."""
 
     exit_code = EXIT_FAILURE
 
@@ -46,7 +46,7 @@ def check_path(path: Path) -> None:
 
 
 class MissingStageError(ScanRelightError):
-    """A stage was asked for whose forerunner has not been run yet."""
+    """A stage was requested whose predecessor has not been run yet."""
 
     exit_code = EXIT_BAD_INPUT
 

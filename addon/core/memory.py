@@ -66,7 +66,7 @@ def free_memory() -> int | None:
     if known_figures:
         return min(known_figures)
     try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2  # macOS does not tell what is free
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2  # macOS does not say what is free
     except (ValueError, OSError, AttributeError):
         return None
 
@@ -130,7 +130,7 @@ def give_back_at_once() -> None:
 
 
 def peak_memory() -> int | None:
-    """Highest resident size so far in bytes; None where the system doesn't tell."""
+    """Highest resident size so far in bytes; None where the system doesn't say."""
     if sys.platform == "linux":
         # Not getrusage: there a process starts with the peak of the one that started it, such as a full Blender.
         peak_of_process = _proc_bytes("/proc/self/status", "VmHWM:")

@@ -81,8 +81,8 @@ def test_what_a_control_group_holds_of_files_is_free(tmp_path, limit, left, pref
     files = tuple(tmp_path / name for name in ("limit", "used", "stat"))
     for file, text in zip(files, (limit, "6500\n", told), strict=True):
         file.write_text(text)
-    assert memory._left_of_group(files) == left
+    assert memory._free_of_group(files) == left
 
 
 def test_no_control_group_is_no_limit(tmp_path):
-    assert memory._left_of_group(tuple(tmp_path / name for name in ("limit", "used", "stat"))) is None
+    assert memory._free_of_group(tuple(tmp_path / name for name in ("limit", "used", "stat"))) is None

@@ -27,7 +27,7 @@ class AgreementParams:
     count : int
         Frames that are looked at, spread evenly.
     width : int
-        About so many pixels across are enough to tell a wrong convention, and cheap.
+        About so many pixels across are enough to recognise a wrong convention, and cheap.
     grid : int
         Rays along an edge of each view.
     jump : float

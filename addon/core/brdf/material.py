@@ -32,7 +32,7 @@ class ObjectMaterial:
     emission : (3,) tuple of float or None
         Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects comes on top.
     unlit : float or None
-        Emitter only: its albedo, as it shows with its light off; a guess. None: nothing tells, so `LAMP_ALBEDO`.
+        Emitter only: its albedo, as it shows with its light off; a guess. None: unknown, so `LAMP_ALBEDO`.
     transmission : float or None
         Transparent only: share of a background's radiance that passes the object; of a cut-out, the share of holes.
     surfaces : float or None

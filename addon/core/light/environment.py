@@ -258,8 +258,8 @@ def _bin(directions: np.ndarray, height: int) -> np.ndarray:
 def _filled(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Unseen directions from seen ones; those below the horizon from below it, those above it from above.
 
-    The ground's radiance says nothing of the sky's. Filled in across the horizon, what light told of the ground was
-    .73, .55 and a third (its bound) of the guess in three rooms, and where it could not tell .9 stood for .5.
+    The ground's radiance says nothing of the sky's. Filled in across the horizon, what the light showed of the ground
+    was .73, .55 and a third (its bound) of the guess in three rooms, and where it showed nothing .9 stood for .5.
     """
     half = len(weight) // 2
     if not half or not (weight[:half] > 0).any() or not (weight[half:] > 0).any():

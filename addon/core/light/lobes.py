@@ -2,7 +2,7 @@
 
 Rays are drawn from a few lobes of different width (by visible normals, weights <= 1) and from the bright triangles; the
 balance heuristic over all of them makes the same rays serve any phi in between. Every observation is computed twice,
-with rays of its own each time: what the two differ by tells the noise of their mean, which the fit takes out.
+with rays of its own each time: their difference gives the noise of their mean, which the fit takes out.
 
 Rays aimed at the openings to the outside (`portals`) were tried as well: of the same number of rays the
 noise of A stayed as it was for broad lobes (0.43 to 0.40 of the radiance on the living room's floor, 0.13 to 0.14 on a

@@ -1,7 +1,7 @@
 """Flat mirrors: light that reaches a surface over one.
 
 A mirror shows every point of the room something else; its L_d, one value an element, says nothing of what it throws on
-its surroundings. Rays that meet one go on in the mirrored direction (`field`), and bright triangles are aimed at
+its surroundings. Rays that meet one continue in the mirrored direction (`field`), and bright triangles are aimed at
 through it (`over_mirrors`). On the living room that took the albedo from 28.0 to 30.2 dB.
 """
 

@@ -126,7 +126,7 @@ class Openings:
     def filled(self, sky: Environment, place: np.ndarray) -> Environment:
         """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone.
 
-        Beside what frames saw through a window the map goes on, or the window's rim would show the room's own colour.
+        Beside what frames saw through a window the map continues, or the window's rim would show the room's own colour.
         """
         directions = sky.directions
         start = np.broadcast_to(np.asarray(place, np.float32), directions.shape)

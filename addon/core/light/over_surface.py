@@ -1,4 +1,4 @@
-"""E over the surface: which estimator is asked at which elements, and what is interpolated between."""
+"""E over the surface: which estimator is evaluated at which elements, and what is interpolated between."""
 
 import functools
 from typing import TypedDict

@@ -1,7 +1,7 @@
 """Portals: the openings that light from outside comes in by, as cells on the room's bounding box to aim rays at.
 
 A window fills a small part of the hemisphere; cosine-distributed rays find it by chance. Where rays that left the mesh
-crossed the bounding box tells where the openings are, without any knowledge of what a window is.
+crossed the bounding box shows where the openings are, without any knowledge of what a window is.
 """
 
 from dataclasses import dataclass

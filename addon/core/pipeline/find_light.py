@@ -1,4 +1,4 @@
-"""All light that no frame tells of by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
+"""All light that no frame shows by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
 
 from collections.abc import Collection
 

@@ -1,6 +1,6 @@
 """The passes over all frames: what L_d, the sky, the specular fit and the lamps' edges each take from them.
 
-One pass, a second where the first tells that poses are off, and one more that makes L_d sharper.
+One pass, a second where the first shows that poses are off, and one more that makes L_d sharper.
 """
 
 from __future__ import annotations

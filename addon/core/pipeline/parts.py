@@ -1,6 +1,6 @@
 """Base colour in parts, for close work: an image for each object, or UDIM tiles, as fine as the frames resolve.
 
-The recovery itself goes on in the room's atlas, whose texels are as large as the frames resolve the room on the whole.
+The recovery itself works on the room's atlas, whose texels are as large as the frames resolve the room on the whole.
 An object that they resolve finer gets finer texels: the frames are looked at once more for what they show there, and
 base colour is multiplied by what this differs from the room's own lit diffuse texture.
 """
@@ -33,7 +33,7 @@ from .frames import Passes
 from .params import PARTS
 
 LOOKED: Shown[float] = 0.3
-"""Share of the writing, as progress tells it, that the look at the frames takes."""
+"""Share of the writing, in terms of progress, that the look at the frames takes."""
 
 STAGE = "detail"
 FOLDER = "objects"
@@ -70,7 +70,7 @@ class Closer:
     atlas : Atlas
         Over that sheet.
     radiance : (n, 3) float32
-        L_d of its elements; NaN where too little tells.
+        L_d of its elements; NaN where too few observations show it.
     """
 
     sheet: Pages

@@ -47,7 +47,7 @@ class Recovery(Corrected):
             pass
 
     def let_go(self) -> None:
-        """Hold surface, materials and median radiance alone, which a scene is made of; no more may be asked for then.
+        """Hold surface, materials and median radiance alone, which a scene is made of; nothing else may be used then.
 
         Blender takes as much for the room's mesh as all the stages' values.
         """

@@ -44,7 +44,7 @@ class Result:
         Its materials.json.
     overrides : Overrides
         What is to be heeded now.
-    asked : frozenset of int
+    requested : frozenset of int
         Objects that are to be fitted again whether something new is given of them or not.
     """
 
@@ -82,7 +82,7 @@ def open_result(
     MissingStageError
         No finished result is there.
     BadInputError
-        An object is unknown, nothing is asked for, or a file is damaged.
+        An object is unknown, nothing is requested, or a file is damaged.
     """
     folder = Path(folder)
     room = read_room(folder)
@@ -96,7 +96,7 @@ def open_result(
         if report.get("code") != code():
             raise _again(folder, "another version of Scan Relight made it")
         result = Result(room, report, materials, overrides, frozenset(objects))
-        result.settings, result.given  # noqa: B018  (what is damaged is told now)
+        result.settings, result.given  # noqa: B018  (damage is reported now)
     except FileNotFoundError as error:
         raise _again(folder, f"'{REPORT}' is missing") from error
     except DAMAGE as error:

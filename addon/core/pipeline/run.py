@@ -48,7 +48,7 @@ def progress_of_run(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a run besides its settings.
+    """What is requested of a run besides its settings.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class Run:
         self._store.close()
 
     def stages(self, unwrap: Unwrap) -> dict[str, Any]:
-        """Do the stages that are asked for, over an atlas by `unwrap`; returns the report of a run that ends there.
+        """Do the stages that are requested, over an atlas by `unwrap`; returns the report of a run that ends there.
 
         It is empty where all are, for `write` reports itself. What was written before stays untouched then.
 

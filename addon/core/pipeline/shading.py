@@ -157,7 +157,7 @@ def shade(
     shining : collection of int
         Objects that frames show clipped, of which `lit_diffuse` holds nothing.
     patches : list of int, optional
-        Objects that were set apart as they were clipped; None where the capture tells of its objects.
+        Objects that were set apart as they were clipped; None where the capture names its objects.
     cameras : sequence of Camera
         Of the frames.
 
@@ -251,7 +251,7 @@ def with_all_light(
     real = atlas.area > 0
     unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
     unseen = [] if "unseen-lamps" in without else unseen
-    # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
+    # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
     light, sun = find_all_light(field, good, unseen, kinds, seed, tilted, shining, without=without)

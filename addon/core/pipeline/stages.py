@@ -1,4 +1,4 @@
-"""The stages in their order: each is computed when it is first asked for, or taken from the result folder."""
+"""The stages in their order: each is computed when it is first needed, or taken from the result folder."""
 
 import time
 from collections.abc import Callable
@@ -54,7 +54,7 @@ T = TypeVar("T")
 
 
 def code() -> str:
-    """16 hex digits that tell the source of the stages from any other."""
+    """16 hex digits that identify the source of the stages."""
     return key(*(digest(stage.source) for stage in STAGES))[:16]
 
 
@@ -77,7 +77,7 @@ class Stages:
     ----------
     capture : Capture
         As read, without frames that add nothing; with the lamps set apart that were found in other objects, once
-        `shading` was asked for.
+        `shading` was called.
     done : dict
         Values of the stages so far.
     log : dict
@@ -148,7 +148,7 @@ class Stages:
 
     @property
     def run_key(self) -> str:
-        """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
+        """16 hex digits that are the same where a capture and all that was requested are, and differ otherwise."""
         parts: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
         parts += () if self.settings.atlas == ROOM else (self.settings.atlas,)
         parts += () if self.settings.texture_fill else ("no texture fill",)
@@ -185,7 +185,7 @@ class Stages:
     def surface(self) -> Surface:
         """Surface elements over the room; around the origin where the room lies far from it.
 
-        Once `shading` was asked for, this and the capture have the lamps set apart that it found in other objects.
+        Once `shading` was called, this and the capture have the lamps set apart that it found in other objects.
         """
         capture = self._near
         return self._stage(
@@ -218,7 +218,7 @@ class Stages:
         return laid_apart(mesh, self.capture.mesh.vertices + moved)
 
     def written_mesh(self) -> Mesh:
-        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in the planes that what they show tells."""
+        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in planes that follow from what they show."""
         mesh = self.room_mesh()
         if not self.surface().noise:
             return mesh

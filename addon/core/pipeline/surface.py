@@ -34,8 +34,8 @@ COARSE: Unit[float] = 1e-6
 def taken_in(capture: Capture) -> Capture:
     """A capture as the stages take it: around the origin, if float32 is coarse where it lies; else as it is.
 
-    In a national grid's coordinates a room lies thousands of kilometres off, where float32 tells no two of its walls
-    apart. Poses and vertices are double as they are read, so nothing is lost where they are moved before rays, elements
+    In a national grid's coordinates a room lies thousands of kilometres off, where float32 can't distinguish two of its
+    walls. Poses and vertices are double as they are read, so nothing is lost where they are moved before rays, elements
     and trees round them.
     """
     used = capture.mesh.vertices[capture.mesh.triangles.ravel()]

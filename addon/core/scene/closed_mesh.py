@@ -44,7 +44,7 @@ def settled(mesh: Mesh) -> Mesh:
     """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
 
     They were laid out behind all of its noise. A step of a centimetre in a floor throws a shadow of several where light
-    comes in low. Faces that hang together move as one plane, so that none of their edges parts. Crumbs of the scan over
+    comes in low. Faces that are connected move as one plane, so that none of their edges parts. Crumbs of the scan over
     the midst of them, as where it ends far from all cameras, are laid flat onto that plane.
     """
     if mesh.closed is None or not len(mesh.closed):

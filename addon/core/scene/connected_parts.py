@@ -1,4 +1,4 @@
-"""Objects for a mesh that tells of none: its connected parts."""
+"""Objects for a mesh that names none: its connected parts."""
 
 import numpy as np
 from scipy.spatial import cKDTree

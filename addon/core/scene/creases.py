@@ -13,7 +13,7 @@ from .weld import one_place, welded
 
 def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
     """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
-    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
+    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what is beyond is not known. 0 at a
     sliver's edges. A sheet's second side bends as its first one does. Of triangles that are not `wanted` ((t,) bool),
     anything."""
     if mesh.backs is not None:
@@ -23,7 +23,7 @@ def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
         return np.concatenate([angle, flipped(angle[mesh.backs])])
     points, faces, _ = welded(mesh, one_place(mesh.vertices))
     if wanted is not None:
-        # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.
+        # Triangles that share an edge have two of its points: the others don't matter, and may be most of a million.
         used = np.zeros(len(points), bool)
         used[faces[wanted]] = True
         near = np.flatnonzero(used[faces].sum(1) >= 2)

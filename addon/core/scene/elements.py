@@ -16,7 +16,7 @@ from .rays import Hits, RayScene
 from .seen_cells import SeenCells
 from .uv_islands import areas, connected, corner_ids
 
-# Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
+# Where in a texel the triangle that covers it is looked up: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
 SUBSAMPLES = np.array(
     [[0, 0], [-0.25, -0.25], [0.25, 0.25], [-0.25, 0.25], [0.25, -0.25],
@@ -181,7 +181,7 @@ def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def _merged(elements: Elements, count: int, coarse: SeenCells | None) -> Elements:
-    """Elements, by rising texel, of which one stands for all of its coarse cell; the first `count` are asked."""
+    """Elements, by rising texel, of which one stands for all of its coarse cell; only the first `count` are merged."""
     separate = np.ones(len(elements.texel), bool)
     if coarse is not None:
         separate[:count] = coarse.seen(elements.position[:count], elements.triangle[:count])

@@ -56,7 +56,7 @@ class FieldOfView:
 
 @dataclass(frozen=True)
 class Division:
-    """tan(theta) = r_d / (1 + k r_d^2); for k < 0 it goes on behind the camera.
+    """tan(theta) = r_d / (1 + k r_d^2); for k < 0 it continues behind the camera.
 
     Fitzgibbon, "Simultaneous linear estimation of multiple view geometry and lens distortion" (CVPR 2001); COLMAP's
     DIVISION and SIMPLE_DIVISION.

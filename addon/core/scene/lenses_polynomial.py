@@ -50,7 +50,7 @@ def _slope(coefficients: tuple[float, ...], s: np.ndarray) -> np.ndarray:
 def _by_blocks(
     function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], values: np.ndarray, width: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What a function of rows ((n, k)) gives, (n, width) and (n,) bool, asked for `BLOCK` of them at a time."""
+    """What a function of rows ((n, k)) gives, (n, width) and (n,) bool, called with `BLOCK` of them at a time."""
     values = np.asarray(values, np.float64)
     result, valid = np.empty((len(values), width)), np.empty(len(values), bool)
     for block in blocks(len(values), BLOCK):

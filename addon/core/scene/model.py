@@ -85,7 +85,7 @@ class Camera:
     def directions(self, pixels: np.ndarray) -> np.ndarray:
         """World directions of unit length through `pixels` ((n, 2) float, x and y), as (n, 3) float32.
 
-        Along the optical axis for pixels that no ray leads to; `rays` tells which those are.
+        Along the optical axis for pixels that no ray leads to; `rays` says which those are.
         """
         if self.lens is not None:
             return self.rays(pixels)[0]

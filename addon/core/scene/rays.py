@@ -71,7 +71,7 @@ class RayScene:
         self._run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))  # builds the tree now, in one thread
 
     def fit(self, extent: float) -> None:
-        """Let origins lie as near to their surface as a room of so many metres needs it, where the mesh goes on."""
+        """Let origins lie as near to their surface as a room of so many metres needs it, where the mesh goes beyond."""
         self.offset = max(RELATIVE_OFFSET * min(self.diagonal, 2 * extent), self._coarse)
 
     def _run(self, origins, directions, **options):

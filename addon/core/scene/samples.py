@@ -65,7 +65,7 @@ class SampleCollector:
     Parameters
     ----------
     triangle_normal : (t, 3) float32, optional
-        The mesh's, where views are handed over that tell how the surface turns within their pixels.
+        The mesh's, where views are handed over that show how the surface turns within their pixels.
     """
 
     def __init__(self, atlas: Atlas, frames: int, seed: int, triangle_normal: np.ndarray | None = None):

@@ -128,6 +128,6 @@ def cell_numbers(place: np.ndarray, label: np.ndarray, level: np.ndarray | int) 
 
 
 def _numbers(place: np.ndarray) -> np.ndarray:
-    """A number for each place ((n, 3) int) on a grid, (n,) uint64: different for any two, as good as surely."""
+    """A number for each place ((n, 3) int) on a grid, (n,) uint64: almost surely different for any two."""
     with np.errstate(over="ignore"):
         return (place.astype(np.uint64) * _STEPS[:3]).sum(1, dtype=np.uint64)

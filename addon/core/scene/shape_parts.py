@@ -148,7 +148,7 @@ def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> 
         members = faces.largest(aligned)
         if not len(members):
             return None
-    # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not hang together.
+    # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not be connected.
     return Plane(normal, point, aligned if _bounds(faces, point, normal, gap) else members)
 
 

@@ -1,4 +1,4 @@
-"""What some of a frame's pixels meet: enough to tell which surface the frames look at, and how closely."""
+"""What some of a frame's pixels meet: enough to know which surface the frames look at, and how closely."""
 
 import numpy as np
 

@@ -16,7 +16,7 @@ T = TypeVar("T", bound=Callable)
 
 
 def of_parts(unwrap: T) -> T:
-    """Marks an unwrap that may be asked for some of a mesh's triangles alone."""
+    """Marks an unwrap that may be called with some of a mesh's triangles alone."""
     vars(unwrap)["of_parts"] = True
     return unwrap
 
