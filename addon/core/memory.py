@@ -38,7 +38,7 @@ class Budget:
             return maximum
         return max(1, min(maximum, (self.limit - used) // 2 // each))
 
-    def ask(self, need: int, what: str) -> None:
+    def require(self, need: int, what: str) -> None:
         """Before long work: raise `MemoryLimitError` where what is left is less than that surely needs, in bytes."""
         used = resident_memory()
         if self.limit and used is not None and used + need > self.limit:

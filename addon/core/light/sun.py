@@ -1,8 +1,8 @@
 """The sun: light from one small disc of the sky, whose shadows are followed exactly.
 
-In a map of the sky it fills a texel or two, which rays find by chance; so it is kept apart from the map (`taken_out`),
+In a map of the sky it fills a texel or two, which rays find by chance; so it is taken from the map (`extract_sun`),
 its part of E comes from shadow rays at every place (`sunlight`), and it goes back into the map that is written
-(`put_in`). One that no frame saw is solved for (`sun_fit`).
+(`insert_sun`). One that no frame saw is solved for (`sun_fit`).
 """
 
 from dataclasses import dataclass, replace
@@ -124,7 +124,7 @@ def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:
     return directions.astype(np.float32), (np.diff(edges) * np.pi / height)[:, None]
 
 
-def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
+def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
     """The map without the sun that frames saw in it, and that sun.
 
     It is what lies within `WIDE` of the middle of the brightest seen texels, if it is more than `above` times over the
@@ -164,7 +164,7 @@ def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
     return environment.refilled(dark), replace(sun, note=f"The frames see the sun: {sun.where()}.")
 
 
-def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
+def insert_sun(environment: Environment, sun: Sun | None) -> np.ndarray:
     """Radiance of the map with the sun in it, (h, 2h, 3) float32; of at least `written_rows` where there is one.
 
     Points of its disc are shared out bilinearly between texel centres: who looks the map up bilinearly sees the sun at

@@ -15,7 +15,7 @@ from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
 from ..evidence.light import spots
 from ..light.over_surface import RayCounts, irradiance
-from ..light.sun import put_in
+from ..light.sun import insert_sun
 from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
@@ -155,7 +155,7 @@ class Corrected(Stages):
 
     def sky(self) -> np.ndarray:
         """Radiance from outside with the sun in it, (h, w, 3) float32, row 0 the bottom."""
-        sky = put_in(self.shading().environment, self.shading().sun)
+        sky = insert_sun(self.shading().environment, self.shading().sun)
         return sky if self.white is None else sky * self.white.of_light
 
 

@@ -126,7 +126,7 @@ class FrameReader:
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
 
 
-def ask_for_disk(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
+def check_disk_space(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
     """Raise `StorageError` where what `Exact` keeps, estimated from some of the frames, does not fit on the disk."""
     sampled_frames, points = (
         frames[:: -(-len(frames) // SAMPLED[0])],

@@ -161,7 +161,7 @@ class Recovery(Corrected):
         if not panels:
             self.store.path(OPENINGS).unlink(missing_ok=True)
             return
-        shift = self.capture.mesh.vertices[0] - self._near.mesh.vertices[0]
+        shift = self.capture.mesh.vertices[0] - self._centred.mesh.vertices[0]
         light = np.ones(3) if self.white is None else self.white.of_light
         entries = [
             {"radiance": (panel.radiance * light).tolist(), "corners": (panel.corners + shift).tolist()}

@@ -148,7 +148,7 @@ class Refit(Recovery):
             raise _again(store.folder, "what its frames show of finer texels was cleared")
         self._specular_before = self._load_specular()
 
-    def _taken(self, capture: Capture, settings: Settings) -> Capture:
+    def _with_chosen_frames(self, capture: Capture, settings: Settings) -> Capture:
         return capture  # the room has those that the run looked at
 
     def _first_key(self, stage: Stage) -> str:

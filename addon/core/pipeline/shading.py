@@ -15,7 +15,7 @@ from ..light.mirrors import Mirror, known_mirror
 from ..light.openings import Openings, looked_out_by
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
-from ..light.sun import Sun, taken_out
+from ..light.sun import Sun, extract_sun
 from ..luminance import LUMINANCE
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
@@ -176,7 +176,7 @@ def shade(
     find_mirrors = None if "mirrors" in without else find_mirrors
     tilted = np.zeros(len(atlas)) if "tilt-error" in without else turned_by_noise(mesh, atlas, surface.noise)
 
-    environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
+    environment, sun = (environment, None) if "seen-sun" in without else extract_sun(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
     dark = LightField(
         mesh, atlas, surface.scene, unseen_dark(lit_diffuse), environment, lookup=surface.lookup

@@ -26,7 +26,7 @@ from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
 from ..results.values import packed, unpacked
-from ..scene.closed_mesh import opened
+from ..scene.closed_mesh import without_closing
 from ..scene.frame_choice import with_frames_that_add
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
@@ -97,18 +97,18 @@ class Stages:
     ):
         check(settings.without)
         if "close-holes" in settings.without:
-            capture = opened(capture)
-        capture = self._taken(capture, settings)
+            capture = without_closing(capture)
+        capture = self._with_chosen_frames(capture, settings)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._as_read = capture
         self.overrides = overrides
         self.read = FrameReader(len(capture.frames))
-        self._near = surface.taken_in(capture)
+        self._centred = surface.centred(capture)
         self._unwrap = unwrap
         self.done: dict[str, Any] = {}
         self.log: dict[str, dict[str, Any]] = {}
 
-    def _taken(self, capture: Capture, settings: Settings) -> Capture:
+    def _with_chosen_frames(self, capture: Capture, settings: Settings) -> Capture:
         """A capture with the frames that are used."""
         if "frame-choice" in settings.without or "lit_diffuse" in settings.published:
             return capture
@@ -117,7 +117,7 @@ class Stages:
     @property
     def frames(self) -> tuple[Frame, ...]:
         """The capture's, in the coordinates that the stages work in, where they were found to be."""
-        return self.observed().of(self._near.frames)
+        return self.observed().of(self._centred.frames)
 
     @cached_property
     def keys(self) -> dict[str, str]:
@@ -187,7 +187,7 @@ class Stages:
 
         Once `shading` was called, this and the capture have the lamps set apart that it found in other objects.
         """
-        capture = self._near
+        capture = self._centred
         return self._stage(
             surface.STAGE,
             lambda settings: surface.make_surface(capture, self._needed_unwrap(), settings),
@@ -213,7 +213,7 @@ class Stages:
 
         A sheet's second side is a little apart from the first.
         """
-        mesh, before = self.surface().mesh, self._near.mesh.vertices
+        mesh, before = self.surface().mesh, self._centred.mesh.vertices
         moved = mesh.vertices[: len(before)] - before  # by itself, so that what did not move is exact
         return laid_apart(mesh, self.capture.mesh.vertices + moved)
 
@@ -227,21 +227,21 @@ class Stages:
     def room_poses(self) -> Poses:
         """Where the frames were found to be, in the capture's coordinates."""
         poses = self.poses().camera_to_world.copy()
-        for pose, original, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
-            pose[:3, 3] += original.camera.centre - near.camera.centre
+        for pose, original, centred in zip(poses, self.capture.frames, self._centred.frames, strict=True):
+            pose[:3, 3] += original.camera.centre - centred.camera.centre
         return replace(self.poses(), camera_to_world=poses)
 
     def observed(self) -> Observed:
         """What the frames show."""
-        room, cameras = self.surface(), [frame.camera for frame in self._near.frames]
+        room, cameras = self.surface(), [frame.camera for frame in self._centred.frames]
 
         def observe(settings: Settings) -> Observed:
             needs = ELEMENT_BYTES * len(room.atlas) + bytes_of_frame(cameras)
-            BUDGET.ask(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
+            BUDGET.require(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
             if cameras and settings.median == "exact":
-                frames.ask_for_disk(room, self._near.frames, self.store.folder)
+                frames.check_disk_space(room, self._centred.frames, self.store.folder)
             passes = frames.Passes(room, self.read, settings, self.store.folder)
-            return frames.observe(passes, self._near, self.progress)
+            return frames.observe(passes, self._centred, self.progress)
 
         def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
             self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))
@@ -275,13 +275,13 @@ class Stages:
         room, observed, first = self.surface(), self.observed(), shading.STAGE.name not in self.done
         result = self._stage(
             shading.STAGE,
-            lambda settings: shading.find_shading(self._near, room, observed, settings, self.progress),
+            lambda settings: shading.find_shading(self._centred, room, observed, settings, self.progress),
             shading.to_store,
             shading.from_store,
         )
         if first and len(result.patches):
             self.done[surface.STAGE.name] = result.patches.surface(room)
-            self.capture, self._near = result.patches.capture(self.capture), result.patches.capture(self._near)
+            self.capture, self._centred = result.patches.capture(self.capture), result.patches.capture(self._centred)
         return result
 
     @cached_property
@@ -312,7 +312,7 @@ class Stages:
         self.store.save(name, key, arrays, {"looked": packed(looked, arrays)})
         self.progress.done()
 
-    def _looked(self) -> dict[int, Looked]:
+    def _stored_looks(self) -> dict[int, Looked]:
         """What blocks of objects have stored."""
         looked: dict[int, Looked] = {}
         for name in self.store.parts(specular.STAGE.name):
@@ -332,7 +332,7 @@ class Stages:
         """The specular stage as it is computed, of all objects or with some `held`."""
         room = self._room(settings)
         pictures = Pictures(self.frames, self.read, self.store.folder, self.surface().groups)
-        return fit_specular(room, pictures if room.frame_names else None, held, None if held else self._looked())
+        return fit_specular(room, pictures if room.frame_names else None, held, None if held else self._stored_looks())
 
     @cached_property
     def median_radiance(self) -> float:

@@ -15,7 +15,7 @@ from ..lit_diffuse.from_picture import texel_edge
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
-from ..scene.closed_mesh import as_scanned, settled
+from ..scene.closed_mesh import as_scanned, with_aligned_closing
 from ..scene.elements import Elements
 from ..scene.model import Capture, Mesh
 from ..scene.stored_light import LitTexture
@@ -31,7 +31,7 @@ COARSE: Unit[float] = 1e-6
 """Step of float32, as a share of the room's diagonal, from which on the room is moved."""
 
 
-def taken_in(capture: Capture) -> Capture:
+def centred(capture: Capture) -> Capture:
     """A capture as the stages take it: around the origin, if float32 is coarse where it lies; else as it is.
 
     In a national grid's coordinates a room lies thousands of kilometres off, where float32 can't distinguish two of its
@@ -73,11 +73,11 @@ def denoised(mesh: Mesh, settings: Settings) -> tuple[Mesh, float]:
         return without_noise(mesh, settings.without)
     scanned, noise = without_noise(as_scanned(mesh), settings.without)
     vertices = np.concatenate([scanned.vertices, mesh.vertices[len(scanned.vertices) :]])
-    return settled(replace(mesh, vertices=vertices)), noise
+    return with_aligned_closing(replace(mesh, vertices=vertices)), noise
 
 
 def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surface:
-    """Lay surface elements out over the mesh of a capture `taken_in`. Raises `BadInputError`: no camera looks at it."""
+    """Lay surface elements out over the mesh of a capture `centred`. Raises `BadInputError`: no camera looks at it."""
     noisy = settings.denoise_mesh and "mesh-denoising" not in settings.without
     mesh, noise = denoised(capture.mesh, settings) if noisy else (capture.mesh, 0.0)
     texel = settings.texel_size

@@ -29,7 +29,7 @@ def as_scanned(mesh: Mesh) -> Mesh:
     )  # fmt: skip
 
 
-def opened(capture: Capture) -> Capture:
+def without_closing(capture: Capture) -> Capture:
     """A capture whose mesh is `as_scanned`."""
     mesh = as_scanned(capture.mesh)
     remaining = set(np.unique(mesh.object_id).tolist())
@@ -40,7 +40,7 @@ def opened(capture: Capture) -> Capture:
     )
 
 
-def settled(mesh: Mesh) -> Mesh:
+def with_aligned_closing(mesh: Mesh) -> Mesh:
     """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
 
     They were laid out behind all of its noise. A step of a centimetre in a floor throws a shadow of several where light
