@@ -11,10 +11,10 @@ from .errors import StorageError
 from .kinds import Shown
 
 TEMPORARY = ".partial-"
-"""What a temporary name begins with; the process id follows, so that the remains of dead runs can be told."""
+"""What a temporary name begins with; the process id follows, so that the remains of dead runs can be recognised."""
 
 HELD_OPEN = os.name == "nt"
-"""Whether a file that another program has open can't be replaced: Windows tells a sharing violation."""
+"""Whether a file that another program has open can't be replaced: Windows reports a sharing violation."""
 PAUSES: Shown[tuple[float, ...]] = (0.05, 0.1, 0.2, 0.4, 0.8)
 """Seconds between one try and the next; scanners let go of a new file after some tenths."""
 

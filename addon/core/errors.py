@@ -16,12 +16,12 @@ LONGEST: Shown[int] = 2000
 
 def one_line(sentence: str) -> str:
     """The sentence as a console can show it: names in it may hold line breaks and what is no character at all."""
-    shown = "".join(c if c.isprintable() else "\ufffd" for c in sentence)
-    return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
+    printable = "".join(c if c.isprintable() else "\ufffd" for c in sentence)
+    return printable if len(printable) <= LONGEST else f"{printable[: LONGEST // 2]} ... {printable[-LONGEST // 2 :]}"
 
 
 class ScanRelightError(Exception):
-    """Base of every error that is told to the user in one sentence."""
+    """Base of every error that is shown to the user in one sentence."""
 
     exit_code = EXIT_FAILURE
 
@@ -46,7 +46,7 @@ def check_path(path: Path) -> None:
 
 
 class MissingStageError(ScanRelightError):
-    """A stage was asked for whose forerunner has not been run yet."""
+    """A stage was requested whose predecessor has not been run yet."""
 
     exit_code = EXIT_BAD_INPUT
 

@@ -21,5 +21,5 @@ def cell_of(position: np.ndarray, edge: float) -> np.ndarray:
 
 
 def by_number(label: np.ndarray) -> dict[int, np.ndarray]:
-    """`by_label`, by the label: hundreds of objects are asked for, and each comparison goes over all elements."""
-    return {int(label[own[0]]): own for own in by_label(label) if len(own)}
+    """`by_label`, by the label: for hundreds of objects, each comparison would go over all elements."""
+    return {int(label[members[0]]): members for members in by_label(label) if len(members)}

@@ -26,11 +26,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, dict):
-        return {str(name): plain(one) for name, one in value.items()}
+        return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if isinstance(value, (set, frozenset)):
-        return sorted(plain(one) for one in value)
+        return sorted(plain(item) for item in value)
     if isinstance(value, PurePath):
         return value.as_posix()
     if isinstance(value, float) and not math.isfinite(value):
@@ -47,8 +47,8 @@ def is_number(value: Any) -> TypeGuard[float]:
     )
 
 
-def numbers(told: Any, names: Sequence[str]) -> list[float] | None:
+def numbers(entry: Any, names: Sequence[str]) -> list[float] | None:
     """The finite numbers that a JSON object has under all of `names`; None where one is absent or something else."""
-    found = [told.get(name) for name in names] if isinstance(told, dict) else [None]
-    known = [value for value in found if is_number(value)]
-    return known if len(known) == len(found) else None
+    values = [entry.get(name) for name in names] if isinstance(entry, dict) else [None]
+    finite = [number for number in values if is_number(number)]
+    return finite if len(finite) == len(values) else None

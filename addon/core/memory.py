@@ -28,29 +28,29 @@ class Budget:
     def __init__(self) -> None:
         self.limit = 0
 
-    def fitting(self, most: int, each: int) -> int:
-        """How many of up to `most` pieces of `each` bytes may be in memory at once; at least one.
+    def fitting(self, maximum: int, each: int) -> int:
+        """How many of up to `maximum` pieces of `each` bytes may be in memory at once; at least one.
 
         They may take half of what is left: the rest is for what is made of them.
         """
-        now = resident_memory()
-        if not self.limit or not each or now is None:
-            return most
-        return max(1, min(most, (self.limit - now) // 2 // each))
+        used = resident_memory()
+        if not self.limit or not each or used is None:
+            return maximum
+        return max(1, min(maximum, (self.limit - used) // 2 // each))
 
-    def ask(self, need: int, what: str) -> None:
+    def require(self, need: int, what: str) -> None:
         """Before long work: raise `MemoryLimitError` where what is left is less than that surely needs, in bytes."""
-        now = resident_memory()
-        if self.limit and now is not None and now + need > self.limit:
+        used = resident_memory()
+        if self.limit and used is not None and used + need > self.limit:
             raise MemoryLimitError(
-                f"{what} need {(now + need) / 1e9:.2g} GB or more, over the memory limit of {self.limit / 1e9:.2g} GB; "
-                "raise it, or take a greater texel size or a smaller atlas size."
+                f"{what} need {(used + need) / 1e9:.2g} GB or more, over the memory limit of "
+                f"{self.limit / 1e9:.2g} GB; raise it, or take a greater texel size or a smaller atlas size."
             )
 
     def is_short(self) -> bool:
         """Whether less than a quarter is left: what could be found again is then not kept."""
-        now = resident_memory()
-        return bool(self.limit) and now is not None and now > 0.75 * self.limit
+        used = resident_memory()
+        return bool(self.limit) and used is not None and used > 0.75 * self.limit
 
 
 BUDGET = Budget()
@@ -58,15 +58,15 @@ BUDGET = Budget()
 
 
 def free_memory() -> int | None:
-    """Bytes that this process could have: of the machine, or of the control group that it runs in; None if untold."""
+    """Bytes that this process could have: of the machine, or of the control group that it runs in; None if unknown."""
     if sys.platform == "win32":
         return _windows_free()
-    told = [_told_by("/proc/meminfo", "MemAvailable:"), *map(_left_of_group, (_GROUP_V2, _GROUP_V1))]
-    known = [one for one in told if one is not None]
-    if known:
-        return min(known)
+    figures = [_proc_bytes("/proc/meminfo", "MemAvailable:"), *map(_free_of_group, (_GROUP_V2, _GROUP_V1))]
+    known_figures = [figure for figure in figures if figure is not None]
+    if known_figures:
+        return min(known_figures)
     try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2  # macOS does not tell what is free
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2  # macOS does not say what is free
     except (ValueError, OSError, AttributeError):
         return None
 
@@ -77,17 +77,17 @@ _GROUP_V1 = tuple(
 )
 
 
-def _told_by(file: str, name: str) -> int | None:
-    """Bytes that a file of /proc tells under a name, in kB."""
+def _proc_bytes(file: str, name: str) -> int | None:
+    """Bytes that a file of /proc gives under a name, in kB."""
     try:
-        with open(file, encoding="ascii", errors="replace") as told:
-            return next((int(line.split()[1]) * 1024 for line in told if line.startswith(name)), None)
+        with open(file, encoding="ascii", errors="replace") as lines:
+            return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(name)), None)
     except OSError:
         return None
 
 
-def _left_of_group(files: tuple[Path, ...]) -> int | None:
-    """What is left of a control group's limit; None where it has none.
+def _free_of_group(files: tuple[Path, ...]) -> int | None:
+    """What is free of a control group's limit; None where it has none.
 
     What it holds of files counts as used there, but is given up for whoever needs it.
     """
@@ -95,19 +95,19 @@ def _left_of_group(files: tuple[Path, ...]) -> int | None:
     try:
         limit, used = (int(file.read_text()) for file in (limit_file, used_file))
         lines = [line.split() for line in stat_file.read_text().splitlines()]
-        held = {name: int(size) for name, size in lines}
+        stat = {name: int(size) for name, size in lines}
     except (OSError, ValueError):  # 'max'
         return None
-    of_files = sum(held.get(f"total_{name}", held.get(name, 0)) for name in ("inactive_file", "active_file"))
+    of_files = sum(stat.get(f"total_{name}", stat.get(name, 0)) for name in ("inactive_file", "active_file"))
     return max(limit - max(used - of_files, 0), 0)
 
 
 def resident_memory() -> int | None:
-    """Resident size now in bytes; the peak where the system tells no more, None where not even that."""
+    """Resident size now in bytes; the peak where the system gives no more, None where not even that."""
     if sys.platform == "linux":
         try:
-            with open("/proc/self/statm", encoding="ascii") as told:
-                return int(told.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+            with open("/proc/self/statm", encoding="ascii") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
         except (OSError, ValueError, IndexError):
             pass
     return peak_memory()
@@ -130,12 +130,12 @@ def give_back_at_once() -> None:
 
 
 def peak_memory() -> int | None:
-    """Highest resident size so far in bytes; None where the system doesn't tell."""
+    """Highest resident size so far in bytes; None where the system doesn't say."""
     if sys.platform == "linux":
         # Not getrusage: there a process starts with the peak of the one that started it, such as a full Blender.
-        told = _told_by("/proc/self/status", "VmHWM:")
-        if told is not None:
-            return told
+        peak_of_process = _proc_bytes("/proc/self/status", "VmHWM:")
+        if peak_of_process is not None:
+            return peak_of_process
     if sys.platform == "win32":
         return _windows_peak()
     try:
@@ -171,10 +171,10 @@ def _windows_peak() -> int | None:
         kernel = ctypes.WinDLL("kernel32")
         kernel.GetCurrentProcess.restype = wintypes.HANDLE
         kernel.K32GetProcessMemoryInfo.argtypes = (wintypes.HANDLE, ctypes.POINTER(Counters), wintypes.DWORD)
-        told = kernel.K32GetProcessMemoryInfo(kernel.GetCurrentProcess(), ctypes.byref(counters), counters.cb)
+        succeeded = kernel.K32GetProcessMemoryInfo(kernel.GetCurrentProcess(), ctypes.byref(counters), counters.cb)
     except (AttributeError, OSError):
         return None
-    return int(counters.peak) if told else None
+    return int(counters.peak) if succeeded else None
 
 
 def _windows_free() -> int | None:
@@ -190,7 +190,7 @@ def _windows_free() -> int | None:
 
     status = Status(length=ctypes.sizeof(Status))
     try:
-        told = ctypes.WinDLL("kernel32").GlobalMemoryStatusEx(ctypes.byref(status))
+        succeeded = ctypes.WinDLL("kernel32").GlobalMemoryStatusEx(ctypes.byref(status))
     except (AttributeError, OSError):
         return None
-    return int(status.free) if told else None
+    return int(status.free) if succeeded else None

@@ -15,14 +15,14 @@ def of_point(point: EntryPoint) -> str:
     return point.value if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
-def of_thing(thing: Any) -> str:
+def of_thing(value: Any) -> str:
     """The same of a function's package, or of a value's class; "" for what is the program's own.
 
     Of a module that belongs to no package: its name and a hash of its source.
     """
-    while isinstance(thing, partial):
-        thing = thing.func
-    module = getattr(thing, "__module__", None) or type(thing).__module__
+    while isinstance(value, partial):
+        value = value.func
+    module = getattr(value, "__module__", None) or type(value).__module__
     return "" if module.startswith(OWN) or module == "builtins" else _of_module(module)
 
 

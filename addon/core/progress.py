@@ -9,7 +9,7 @@ from .errors import InterruptedRun
 
 @dataclass(frozen=True)
 class ProgressEvent:
-    """What is told to whoever listens.
+    """What a listener is given.
 
     Attributes
     ----------

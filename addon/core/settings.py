@@ -103,10 +103,10 @@ class Settings:
         for name, allowed in self.CHOICES.items():
             if getattr(self, name) not in allowed:
                 raise BadInputError(f"Setting '{name}' is '{getattr(self, name)}'; choose one of {', '.join(allowed)}.")
-        for f in fields(self):
-            value = getattr(self, f.name)
+        for field in fields(self):
+            value = getattr(self, field.name)
             if isinstance(value, (int, float)) and not isinstance(value, bool) and not 0 <= value < float("inf"):
-                raise BadInputError(f"Setting '{f.name}' is {value}; give a finite number of at least 0.")
+                raise BadInputError(f"Setting '{field.name}' is {value}; give a finite number of at least 0.")
         if not self.detail > 0:
             raise BadInputError(f"Setting 'detail' is {self.detail}; give more than 0.")
         if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:

@@ -1,4 +1,4 @@
-"""What counts as beyond chance, how few are too few to tell, and how many are enough, wherever that is asked."""
+"""What counts as beyond chance, how few are too few to decide, and how many are enough, wherever that matters."""
 
 from dataclasses import dataclass
 
@@ -33,9 +33,9 @@ class SignificanceParams:
     sure : float
         Relative standard error up to which an element speaks for others.
     of_object : int
-        Elements that stand for an object where many rays are asked for each.
+        Elements that stand for an object where each takes many rays.
     views : int
-        Views of an element that tell what changes with the view.
+        Views of an element that show what changes with the view.
     neighbours : int
         The nearest elements or points that one is compared with, or takes its value from.
     most : int

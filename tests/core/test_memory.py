@@ -61,12 +61,12 @@ def test_pieces_fit_into_half_of_what_is_left():
 
 def test_what_surely_does_not_fit_is_told_before_the_work():
     budget = Budget()
-    budget.ask(1 << 50, "Its elements")  # no limit
+    budget.require(1 << 50, "Its elements")  # no limit
     budget.limit = 1 << 30
     with pytest.raises(
         MemoryLimitError, match=r"^Its elements need 1e\+03 GB or more, over the memory limit of 1\.1 GB; "
     ):
-        budget.ask(10**12, "Its elements")
+        budget.require(10**12, "Its elements")
 
 
 def test_what_is_free_is_less_than_the_machine_has():
@@ -81,8 +81,8 @@ def test_what_a_control_group_holds_of_files_is_free(tmp_path, limit, left, pref
     files = tuple(tmp_path / name for name in ("limit", "used", "stat"))
     for file, text in zip(files, (limit, "6500\n", told), strict=True):
         file.write_text(text)
-    assert memory._left_of_group(files) == left
+    assert memory._free_of_group(files) == left
 
 
 def test_no_control_group_is_no_limit(tmp_path):
-    assert memory._left_of_group(tuple(tmp_path / name for name in ("limit", "used", "stat"))) is None
+    assert memory._free_of_group(tuple(tmp_path / name for name in ("limit", "used", "stat"))) is None

@@ -9,7 +9,7 @@ import numpy as np
 from ..io.conventions import SCALES, Convention, alternatives
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
-from .edges import Shown, edge_score, shown
+from .edges import MeshView, edge_score, mesh_view
 from .misalignment import misalignments
 from .params import AGREEMENT
 from .photometric import consistency
@@ -44,7 +44,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Agreement:
-    """What looking at the capture told.
+    """What looking at the capture showed.
 
     Attributes
     ----------
@@ -75,15 +75,15 @@ class Agreement:
         return self.best is None and not np.isfinite(self.as_read.colour)
 
     def sentences(self) -> list[str]:
-        """What a user is told."""
-        told = [self.sentence()]
+        """The messages for a user."""
+        sentences = [self.sentence()]
         if self.up not in ("+z", ""):
             convention = replace(self.best.convention if self.best else Convention(), up=self.up)
-            told.append(
+            sentences.append(
                 f"The capture lies on its side: {self.up} is up in its frames; --convention {convention} turns "
                 "it upright."
             )
-        return told
+        return sentences
 
     def sentence(self) -> str:
         """Whether the frames fit the mesh, in words."""
@@ -120,21 +120,21 @@ class _Scene:
 
     @cached_property
     def exposed(self) -> bool:
-        """Whether all frames' exposures are told."""
+        """Whether all frames' exposures are known."""
         return not any(frame.uncalibrated for frame in self.capture.frames)
 
     def colour(self, convention: Convention, every: int = 1) -> Fit:
         views = self.views[::every]
-        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays, self.exposed)
-        return Fit(convention, found.score, float("nan"), found.hit)
+        result = consistency(views, convention.cameras([view.camera for view in views]), self.rays, self.exposed)
+        return Fit(convention, result.score, float("nan"), result.hit)
 
-    def shown(self, convention: Convention) -> list[Shown]:
+    def mesh_views(self, convention: Convention) -> list[MeshView]:
         cameras = convention.cameras([view.camera for view in self.views])
         bends = not self.capture.mesh.whole
-        return [shown(camera, self.capture.mesh, self.rays, bends) for camera in cameras]
+        return [mesh_view(camera, self.capture.mesh, self.rays, bends) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:
-        return replace(fit, edge=edge_score(self.views, self.shown(fit.convention)))
+        return replace(fit, edge=edge_score(self.views, self.mesh_views(fit.convention)))
 
 
 def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True) -> Agreement:
@@ -153,19 +153,19 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     """
     mesh = capture.mesh
     scene = _Scene(small_views(capture.frames, read), capture, RayScene(mesh.vertices, mesh.triangles))
-    seen = scene.shown(Convention())
-    plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
+    mesh_views = scene.mesh_views(Convention())
+    as_read = replace(scene.colour(Convention()), edge=edge_score(scene.views, mesh_views))
     up = _up(scene.views, Convention())
-    if plain.quality >= AGREEMENT.agree:
-        return Agreement(plain, None, misalignments(scene.views, seen, scene.rays), False, up)
+    if as_read.quality >= AGREEMENT.agree:
+        return Agreement(as_read, None, misalignments(scene.views, mesh_views, scene.rays), False, up)
     if _flat(scene.views):
-        plain, search = replace(plain, colour=np.nan), False
+        as_read, search = replace(as_read, colour=np.nan), False
     if not search or len(scene.views) < 2:
-        return Agreement(plain, None, np.zeros(0), False, up)
+        return Agreement(as_read, None, np.zeros(0), False, up)
     best = _search(scene)
-    if best is not None and best.quality < max(AGREEMENT.agree, plain.quality + AGREEMENT.better):
+    if best is not None and best.quality < max(AGREEMENT.agree, as_read.quality + AGREEMENT.better):
         best = None
-    return Agreement(plain, best, np.zeros(0), True, up if best is None else _up(scene.views, best.convention))
+    return Agreement(as_read, best, np.zeros(0), True, up if best is None else _up(scene.views, best.convention))
 
 
 def _flat(views: Sequence[SmallView]) -> bool:
@@ -188,9 +188,9 @@ def _search(scene: _Scene) -> Fit | None:
     best: Fit | None = None
     for scale in (1.0, *_likely(scene)):
         every = max(1, len(scene.views) // AGREEMENT.coarse)
-        found = [scene.colour(replace(one, scale=scale), every) for one in alternatives()]
-        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[: AGREEMENT.coarse]
-        for fit in (scene.whole(scene.colour(fit.convention)) for fit in found):
+        fits = [scene.colour(replace(convention, scale=scale), every) for convention in alternatives()]
+        fits = sorted((fit for fit in fits if fit.quality > 0), key=lambda fit: -fit.quality)[: AGREEMENT.coarse]
+        for fit in (scene.whole(scene.colour(fit.convention)) for fit in fits):
             if best is None or fit.quality > best.quality + AGREEMENT.tie * np.sign(
                 fit.convention.parts - best.convention.parts
             ):
@@ -205,5 +205,7 @@ def _likely(scene: _Scene) -> list[float]:
     centres = np.array([view.camera.centre for view in scene.views])
     extent = float(np.ptp(scene.capture.mesh.vertices[scene.capture.mesh.triangles.ravel()], axis=0).max())
     spread = max(float(np.ptp(centres, axis=0).max()), 1e-9)
-    off = {scale: abs(np.log(scale * spread / (extent / 3))) for scale in SCALES}
-    return sorted((scale for scale in SCALES if off[scale] < np.log(AGREEMENT.plausible)), key=off.__getitem__)
+    distance = {scale: abs(np.log(scale * spread / (extent / 3))) for scale in SCALES}
+    return sorted(
+        (scale for scale in SCALES if distance[scale] < np.log(AGREEMENT.plausible)), key=distance.__getitem__
+    )

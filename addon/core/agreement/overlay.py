@@ -9,7 +9,7 @@ from ..kinds import Shown
 from ..photo import photo
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
-from .edges import shown
+from .edges import mesh_view
 
 ROWS: Shown[int] = 3
 WIDTH: Shown[int] = 640
@@ -33,12 +33,12 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
         step = max(1, -(-frame.camera.width // WIDTH))
         camera = frame.camera.coarser(step)
         radiance = pixels.radiance[: camera.height * step : step, : camera.width * step : step]
-        lit = radiance[radiance.sum(-1) > 0]
-        plain = photo(radiance, float(np.median(lit)) if len(lit) else 1.0)
+        exposed = radiance[radiance.sum(-1) > 0]
+        plain = photo(radiance, float(np.median(exposed)) if len(exposed) else 1.0)
         images = []
         for convention in conventions:
             image = plain.copy()
-            image[shown(convention.cameras([camera])[0], capture.mesh, rays).edge] = LINE
+            image[mesh_view(convention.cameras([camera])[0], capture.mesh, rays).edge] = LINE
             images.append(image)
         rows.append(_beside(images, 1))
     return _beside(rows, 0)
@@ -46,13 +46,13 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
 
 def _beside(images: Sequence[np.ndarray], axis: int) -> np.ndarray:
     """Images in a row (axis 1) or column (axis 0), on black where sizes differ."""
-    across = 1 - axis
-    extent = max(image.shape[across] for image in images)
+    other_axis = 1 - axis
+    extent = max(image.shape[other_axis] for image in images)
     padded = []
     for image in images:
         pad = [(0, 0), (0, 0), (0, 0)]
-        pad[across] = (0, extent - image.shape[across])
+        pad[other_axis] = (0, extent - image.shape[other_axis])
         pad[axis] = (0, GAP)
         padded.append(np.pad(image, pad))
-    whole = np.concatenate(padded, axis)
-    return whole[:-GAP] if axis == 0 else whole[:, :-GAP]
+    mosaic = np.concatenate(padded, axis)
+    return mosaic[:-GAP] if axis == 0 else mosaic[:, :-GAP]

@@ -1,4 +1,4 @@
-"""How it is told whether frames and mesh fit."""
+"""How it is decided whether frames and mesh fit."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ class AgreementParams:
     count : int
         Frames that are looked at, spread evenly.
     width : int
-        About so many pixels across are enough to tell a wrong convention, and cheap.
+        About so many pixels across are enough to recognise a wrong convention, and cheap.
     grid : int
         Rays along an edge of each view.
     jump : float
@@ -55,7 +55,7 @@ AGREEMENT = AgreementParams()
 
 @dataclass(frozen=True)
 class MisalignmentParams:
-    """Of `misalignment`: how far frames lie beside the mesh.
+    """Of `misalignment`: how far frames are displaced from the mesh.
 
     Attributes
     ----------

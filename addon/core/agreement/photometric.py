@@ -1,4 +1,4 @@
-"""Do views agree on the colour of the spots that they share? Only with the right poses do they."""
+"""Do views agree on the colour of the spots that they share? They do only with the right poses."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -36,38 +36,38 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
     cameras : sequence of Camera
         The views' cameras, in the pose to be tried.
     exposed : bool
-        Whether exposures and white balance are told; if not, each two views may differ by a factor in each channel.
+        Whether exposures and white balance are known; if not, each two views may differ by a factor in each channel.
     """
     rng = np.random.default_rng(0)
-    near, far, hits, rays = [], [], 0, 0
+    same_spot, other_spot, hits, rays = [], [], 0, 0
     for i, (view, camera) in enumerate(zip(views, cameras, strict=True)):
         x, y = (
             np.unique(np.linspace(0, n - 1, AGREEMENT.grid).round().astype(int)) for n in (camera.width, camera.height)
         )
         column, row = (a.ravel() for a in np.meshgrid(x, y))
         directions = camera.directions(np.stack([column + 0.5, row + 0.5], -1))
-        found = scene.intersect(camera.centre, directions)
-        own = view.log[row, column]
-        rays += len(own)
-        hits += int((found.triangle >= 0).sum())
-        good = (found.triangle >= 0) & np.isfinite(own).all(1)
-        points = camera.centre + found.distance[good, None].astype(np.float64) * directions[good]
-        own = own[good]
-        for j, (other, eye) in enumerate(zip(views, cameras, strict=True)):
+        ray_hits = scene.intersect(camera.centre, directions)
+        log_radiance = view.log[row, column]
+        rays += len(log_radiance)
+        hits += int((ray_hits.triangle >= 0).sum())
+        good = (ray_hits.triangle >= 0) & np.isfinite(log_radiance).all(1)
+        points = camera.centre + ray_hits.distance[good, None].astype(np.float64) * directions[good]
+        log_radiance = log_radiance[good]
+        for j, (other, other_camera) in enumerate(zip(views, cameras, strict=True)):
             if j == i:
                 continue
-            inside, pixels = sees(eye, points, scene)
+            inside, pixels = sees(other_camera, points, scene)
             column, row = pixels.astype(int).T
-            theirs = other.log[row, column]
-            known = np.isfinite(theirs).all(1)
-            inside, theirs = inside[known], theirs[known]
+            other_log = other.log[row, column]
+            known = np.isfinite(other_log).all(1)
+            inside, other_log = inside[known], other_log[known]
             if len(inside) > 1:
                 if not exposed:
-                    theirs = theirs + np.median(own[inside] - theirs, 0)
-                near.append(np.abs(own[inside] - theirs).mean(1))
-                far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
+                    other_log = other_log + np.median(log_radiance[inside] - other_log, 0)
+                same_spot.append(np.abs(log_radiance[inside] - other_log).mean(1))
+                other_spot.append(np.abs(log_radiance[inside] - other_log[rng.permutation(len(inside))]).mean(1))
     hit = hits / max(rays, 1)
-    if sum(map(len, near)) < LEVELS.many:
+    if sum(map(len, same_spot)) < LEVELS.many:
         return Consistency(float("nan"), hit)
-    a, b = np.concatenate(near), np.concatenate(far)
+    a, b = np.concatenate(same_spot), np.concatenate(other_spot)
     return Consistency(float((a < b).mean() + (a == b).mean() / 2), hit)

@@ -37,9 +37,9 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels]) -> lis
     for frame in (frames[i] for i in chosen):
         try:
             pixels = read(frame)
-        except BadInputError:  # it will be told of where frames are read for good
+        except BadInputError:  # it is reported where the frames are read in full
             continue
-        shorter = min(frame.camera.width, frame.camera.height)  # of a strip, edges are to be left
+        shorter = min(frame.camera.width, frame.camera.height)  # a narrow strip still needs room for edges
         step = max(1, min(round(frame.camera.width / AGREEMENT.width), shorter // 2))
         camera = frame.camera.coarser(step)
         views.append(SmallView(camera, _small(pixels, step), step))
@@ -49,7 +49,7 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels]) -> lis
 def sees(
     camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.0, slack: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which points of the mesh a camera sees, none of its triangles before them, and at which pixels.
+    """Which points of the mesh a camera sees unoccluded, and at which pixels.
 
     Parameters
     ----------
@@ -61,26 +61,26 @@ def sees(
 
     Returns
     -------
-    which : (k,) int
+    index : (k,) int
     pixels : (k, 2) float64
         x and y.
     """
     pixels, depth = camera.project(points)
     end = camera.width - margin, camera.height - margin
-    which = np.flatnonzero((depth > 0) & (pixels >= margin).all(1) & (pixels < end).all(1))
-    away = camera.centre - points[which]
-    distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
-    away /= distance
-    origins = points[which] + away * (4 * scene.offset + slack * distance)
+    index = np.flatnonzero((depth > 0) & (pixels >= margin).all(1) & (pixels < end).all(1))
+    to_camera = camera.centre - points[index]
+    distance = np.maximum(np.linalg.norm(to_camera, axis=1, keepdims=True), 1e-12)
+    to_camera /= distance
+    origins = points[index] + to_camera * (4 * scene.offset + slack * distance)
     reach = (1 - slack) * distance[:, 0] - 8 * scene.offset
-    free = ~scene.occluded(*(np.asarray(a, np.float32) for a in (origins, away, reach)))
-    return which[free], pixels[which[free]]
+    visible = ~scene.occluded(*(np.asarray(a, np.float32) for a in (origins, to_camera, reach)))
+    return index[visible], pixels[index[visible]]
 
 
 def _small(pixels: Pixels, step: int) -> np.ndarray:
     """Logarithm of the mean over blocks; a block with a pixel that says nothing is NaN."""
     small = pixels.coarser(step)
-    lit = small.radiance[small.valid]
-    floor = 1e-3 * float(np.median(lit)) if len(lit) else 1.0
+    radiance = small.radiance[small.valid]
+    floor = 1e-3 * float(np.median(radiance)) if len(radiance) else 1.0
     log = np.log(np.maximum(small.radiance, max(floor, 1e-30)))
     return np.where(small.valid[..., None], log, np.nan).astype(np.float32)

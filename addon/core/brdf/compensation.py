@@ -55,11 +55,11 @@ def layer_reflectance(psi: float | np.ndarray, phi: float | np.ndarray) -> np.nd
     psi = np.clip(np.asarray(psi, np.float64), 0.0, _PSI[-1])
     roughness = np.sqrt(np.clip(np.asarray(phi, np.float64), _ROUGHNESS[0] ** 2, 1.0))
     # E rises like the root of psi where psi is small.
-    row, down = _between(np.sqrt(_PSI), np.sqrt(psi))
-    column, across = _between(_ROUGHNESS, roughness)
-    upper = (1 - across) * _BEYOND_PSI[row, column] + across * _BEYOND_PSI[row, column + 1]
-    lower = (1 - across) * _BEYOND_PSI[row + 1, column] + across * _BEYOND_PSI[row + 1, column + 1]
-    return psi + (1 - psi) * ((1 - down) * upper + down * lower)
+    row, row_share = _between(np.sqrt(_PSI), np.sqrt(psi))
+    column, column_share = _between(_ROUGHNESS, roughness)
+    upper = (1 - column_share) * _BEYOND_PSI[row, column] + column_share * _BEYOND_PSI[row, column + 1]
+    lower = (1 - column_share) * _BEYOND_PSI[row + 1, column] + column_share * _BEYOND_PSI[row + 1, column + 1]
+    return psi + (1 - psi) * ((1 - row_share) * upper + row_share * lower)
 
 
 def base_color(albedo: np.ndarray, psi: float | np.ndarray, phi: float | np.ndarray) -> np.ndarray:
@@ -76,8 +76,8 @@ def base_color(albedo: np.ndarray, psi: float | np.ndarray, phi: float | np.ndar
     -------
     (n, 3), of `albedo`'s type; above 1 where the two lobes together would reflect more than all light
     """
-    kept = np.broadcast_to(1 - layer_reflectance(psi, phi), albedo.shape[:1])
-    return (albedo / kept[:, None]).astype(albedo.dtype)
+    transmitted = np.broadcast_to(1 - layer_reflectance(psi, phi), albedo.shape[:1])
+    return (albedo / transmitted[:, None]).astype(albedo.dtype)
 
 
 def _between(knots, x):

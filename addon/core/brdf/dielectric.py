@@ -19,7 +19,7 @@ SATIN = 0.5
 PRIOR = Prior(USUAL_F0, 0.01)
 """Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
 much stronger for nearly the same frames (living room's panels: alpha 0.39 with F0 0.05 or 0.45 with 0.1): there this
-decides; where the frames tell, they outweigh it."""
+decides; where the frames show it, they outweigh it."""
 
 
 @dataclass(frozen=True, eq=False)

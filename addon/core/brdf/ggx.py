@@ -37,19 +37,19 @@ def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.
     stretched = wo * np.array([[phi], [phi], [1]], np.float32)
     stretched = stretched / np.sqrt((stretched * stretched).sum(0))
     x, y, z = stretched
-    across = np.sqrt(x * x + y * y)
-    upright = across < 1e-6
-    safe = np.where(upright, 1, across)
+    sine = np.sqrt(x * x + y * y)
+    upright = sine < 1e-6
+    safe = np.where(upright, 1, sine)
     # t1 and t2 = stretched x t1 span the disc that is sampled; t1 lies level
     t1x, t1y = np.where(upright, 1, -y / safe), np.where(upright, 0, x / safe)
     t2x, t2y, t2z = (c[:, None] for c in (-z * t1y, z * t1x, x * t1y - y * t1x))
     x, y, z, t1x, t1y = (c[:, None] for c in (x, y, z, t1x, t1y))
     radius, angle = np.sqrt(square[0]), np.float32(2 * np.pi) * square[1]
     p1, p2 = radius * np.cos(angle), radius * np.sin(angle)
-    rest = 1 - p1 * p1
+    chord_square = 1 - p1 * p1
     s = (1 + z) / 2
-    p2 = (1 - s) * np.sqrt(rest) + s * p2
-    up = np.sqrt(np.maximum(rest - p2 * p2, 0))
+    p2 = (1 - s) * np.sqrt(chord_square) + s * p2
+    up = np.sqrt(np.maximum(chord_square - p2 * p2, 0))
     alpha = np.float32(phi)
     h = np.stack([
         alpha * (p1 * t1x + p2 * t2x + up * x),
@@ -71,18 +71,18 @@ class _GGX:
         m, k = n_w.shape
         result = np.empty((m, len(grid), k), np.float32)
         square, cos2_h, base = n_w * n_w, 1 - sin2_h, np.empty_like(n_w)
-        below = np.empty_like(n_w)
+        denominator = np.empty_like(n_w)
         for i, phi in enumerate(grid):
             a = np.float32(phi) * np.float32(phi)
             np.multiply(cos2_h, a, out=base)
             base += sin2_h
             base *= base
-            np.multiply(square, 1 - a, out=below)
-            below += a
-            np.sqrt(below, out=below)
-            below += n_w
-            below *= base
-            np.divide(G1(n_wo, phi) * (a / np.float32(np.pi)), below, out=result[:, i])
+            np.multiply(square, 1 - a, out=denominator)
+            denominator += a
+            np.sqrt(denominator, out=denominator)
+            denominator += n_w
+            denominator *= base
+            np.divide(G1(n_wo, phi) * (a / np.float32(np.pi)), denominator, out=result[:, i])
         return result
 
     def reflect(self, wi: np.ndarray, square: np.ndarray, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

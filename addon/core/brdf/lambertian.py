@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from .model import Brdf
 
 USUAL_ALBEDO = 0.5
-"""Of a room's surfaces, on average: what is taken where nothing tells."""
+"""Of a room's surfaces, on average: what is taken where nothing is known."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ class ObjectMaterial:
     emission : (3,) tuple of float or None
         Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects comes on top.
     unlit : float or None
-        Emitter only: its albedo, as it shows with its light off; a guess. None: nothing tells, so `LAMP_ALBEDO`.
+        Emitter only: its albedo, as it shows with its light off; a guess. None: unknown, so `LAMP_ALBEDO`.
     transmission : float or None
         Transparent only: share of a background's radiance that passes the object; of a cut-out, the share of holes.
     surfaces : float or None
@@ -86,7 +86,7 @@ class ObjectMaterial:
 
     def as_dict(self) -> dict[str, Any]:
         """As materials.json and a stored stage have it."""
-        return {one.name: getattr(self, one.name) for one in fields(self)} | {"model": self.model.name}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"model": self.model.name}
 
 
 def with_metals(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
@@ -110,13 +110,13 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
     """
     color, elements = albedo.copy(), by_number(object_id)
     for m in materials:
-        if (own := elements.get(m.object_id)) is not None:
-            color[own] = m.model.base_color(color[own], m)
+        if (index := elements.get(m.object_id)) is not None:
+            color[index] = m.model.base_color(color[index], m)
     return color
 
 
 def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
-    """What an object is taken for of which nothing was recovered."""
+    """The description of an object of which nothing was recovered."""
     return ObjectMaterial(object_id, class_name, LAMBERTIAN, note="no description")
 
 
@@ -124,16 +124,16 @@ EARLIER = {"alpha": "phi", "f0": "psi", "f0_low": "specular_low", "f0_high": "sp
 """What results of version 0.1 call them."""
 
 
-def renamed(told: dict[str, Any]) -> dict[str, Any]:
-    """An entry of materials.json by today's names."""
-    today = {name: value for name, value in told.items() if name not in EARLIER.values()}
-    for name, before in EARLIER.items():
-        if told.get(before) is not None and today.get(name) is None:
-            today[name] = told[before]
-    return today
+def renamed(entry: dict[str, Any]) -> dict[str, Any]:
+    """An entry of materials.json with the current names."""
+    current = {name: value for name, value in entry.items() if name not in EARLIER.values()}
+    for name, earlier in EARLIER.items():
+        if entry.get(earlier) is not None and current.get(name) is None:
+            current[name] = entry[earlier]
+    return current
 
 
-def from_json(told: dict[str, Any]) -> ObjectMaterial:
+def from_json(entry: dict[str, Any]) -> ObjectMaterial:
     """A description as materials.json or a stored stage has it; further keys are left out.
 
     Raises
@@ -141,9 +141,9 @@ def from_json(told: dict[str, Any]) -> ObjectMaterial:
     BadInputError
         Its model is of a package that is not there.
     """
-    known: dict[str, Any] = {
+    values: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
-        for name, value in renamed(told).items()
+        for name, value in renamed(entry).items()
         if name in ObjectMaterial.__dataclass_fields__
     }
-    return ObjectMaterial(**known | {"model": named(known["model"])})
+    return ObjectMaterial(**values | {"model": named(values["model"])})

@@ -206,7 +206,7 @@ class Brdf:
 
     @property
     def has_albedo(self) -> bool:
-        """Whether its diffuse albedo is one that frames tell."""
+        """Whether its diffuse albedo is one that frames show."""
         return self.has_diffuse and not self.see_through
 
     def evaluate(
@@ -240,7 +240,7 @@ class Brdf:
         return float(np.mean(value))
 
     def plausible_f0(self, base_color: Any = None) -> F0 | None:
-        """F0 of an object of which no frame tells it; `base_color` ((3,)) is the colour it is known by, if any."""
+        """F0 of an object whose F0 no frame shows; `base_color` ((3,)) is the colour it is known by, if any."""
         return None
 
     def base_color(self, albedo: np.ndarray, of: Parameters) -> np.ndarray:

@@ -20,7 +20,7 @@ from .model import Brdf
 from .transparent import TRANSPARENT
 
 GROUP = "scan_relight.brdfs"
-_models: dict[str, Brdf] = {one.name: one for one in (LAMBERTIAN, DIELECTRIC, METAL, EMITTER, TRANSPARENT)}
+_models: dict[str, Brdf] = {model.name: model for model in (LAMBERTIAN, DIELECTRIC, METAL, EMITTER, TRANSPARENT)}
 
 
 _packages: dict[str, str] = {}
@@ -58,11 +58,11 @@ def shown(name: str | None) -> Brdf:
 
 def named(name: str) -> Brdf:
     """The model of a name; raises `BadInputError` where there is none."""
-    found = find(name)
-    if found is None:
-        known = ", ".join(one.name for one in models())
+    model = find(name)
+    if model is None:
+        known = ", ".join(item.name for item in models())
         raise BadInputError(f"There is no reflectance model '{name}', only {known}; install the package that has it.")
-    return found
+    return model
 
 
 @cache

@@ -110,42 +110,45 @@ def solve(
     spread = spread_with(np.full((3, 1), USUAL_F0) if fixed is None else fixed)
     weight = dense.there / np.square(spread)
     for _ in range(1 if lobe is None or fixed is not None else LOBE_FIT.rounds):
-        wt = weight * t
-        below = np.maximum((wt * t).sum(1), np.float32(1e-20))
-        left = weight * (1 - wt * t / below[:, None])  # of independent noise, once the diffuse part has had its share
-        SR = np.einsum("hvg,chvg->chg", wt, R)
+        weighted_t = weight * t
+        denominator = np.maximum((weighted_t * t).sum(1), np.float32(1e-20))
+        # Of independent noise, once the diffuse part has had its share.
+        free_weight = weight * (1 - weighted_t * t / denominator[:, None])
+        SR = np.einsum("hvg,chvg->chg", weighted_t, R)
         if lobe is None:
-            values, rest = np.zeros((3, shape[0]), np.float32), R - (SR / below)[:, :, None] * t
+            values, residual = np.zeros((3, shape[0]), np.float32), R - (SR / denominator)[:, :, None] * t
         else:
             A = np.broadcast_to(lobe.A, R.shape)
-            SA = np.einsum("hvg,chvg->chg", wt, A)
+            SA = np.einsum("hvg,chvg->chg", weighted_t, A)
             if fixed is not None:
                 values = fixed
             else:
                 wA = weight * A
-                up = np.einsum("chvg,chvg->ch", wA, R) - np.einsum("chg,chg->ch", SA / below, SR)
-                down = np.einsum("chvg,chvg->ch", wA, A) - np.einsum("chg,chg->ch", SA / below, SA)
-                up += np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AB, R.shape))
-                clean = down - np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AA, R.shape))
+                numerator = np.einsum("chvg,chvg->ch", wA, R) - np.einsum("chg,chg->ch", SA / denominator, SR)
+                square = np.einsum("chvg,chvg->ch", wA, A) - np.einsum("chg,chg->ch", SA / denominator, SA)
+                numerator += np.einsum("hvg,chvg->ch", free_weight, np.broadcast_to(lobe.AB, R.shape))
+                clean = square - np.einsum("hvg,chvg->ch", free_weight, np.broadcast_to(lobe.AA, R.shape))
                 if not constraints.coloured:
-                    up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
+                    numerator, square, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (numerator, square, clean))
                 if prior is not None:
                     # errors of one element's channels and views go together: they count once
                     counts = 3 * dense.views * (scale / prior.sigma) ** 2
-                    up, down, clean = up + counts * prior.psi, down + counts, clean + counts
-                values = np.clip(up / np.maximum(np.maximum(clean, LOBE_FIT.least_signal * down), 1e-30), least_psi, 1)
-            each = values[:, :, None, None]
-            rest = R - each * A
-            rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
+                    numerator, square, clean = numerator + counts * prior.psi, square + counts, clean + counts
+                values = np.clip(
+                    numerator / np.maximum(np.maximum(clean, LOBE_FIT.least_signal * square), 1e-30), least_psi, 1
+                )
+            broadcast_psi = values[:, :, None, None]
+            residual = R - broadcast_psi * A
+            residual -= ((SR - values[..., None] * SA) / denominator)[:, :, None] * t
         spread = spread_with(values)
-        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * (dense.inflate / spread)
+        size = np.sqrt(np.einsum("chvg,chvg->hvg", residual, residual) / 3) * (dense.inflate / spread)
         weight = dense.there / np.square(spread) * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
     if dense.spread is None:  # else the same for all hypotheses
         cost = cost + np.log(spread)
     if lobe is not None:
-        noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
-        cost -= weight * left * np.square(spread * dense.inflate / scale) * noise / 6
+        noise = (broadcast_psi * (broadcast_psi * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
+        cost -= weight * free_weight * np.square(spread * dense.inflate / scale) * noise / 6
     cost *= dense.there
     by_element = cost.sum(1, dtype=np.float64)
     total = by_element.sum(1)
@@ -180,37 +183,37 @@ def fit_lobe(
         Given: phi alone is sought.
     """
     dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
-    solved = functools.partial(solve, constraints=constraints, psi=psi)
+    solve_lobe = functools.partial(solve, constraints=constraints, psi=psi)
     kappas = LOBE_FIT.kappas if "grazing" not in dense.without else (0.0,)
     scale = robust_scale(dense.seen(solve(dense, None, kappas[:1], 1.0).size[0]))
 
     def step(dense: DenseProblem, kappa: float, scale: float) -> tuple[int, np.ndarray, float, float]:
         """phi at a kappa, kappa at that phi: index of phi, its psi, kappa, and the scale of what is left."""
-        best = int(np.argmin(solved(dense, slice(None), kappa, scale).total))
-        by_kappa = solved(dense, slice(best, best + 1), kappas, scale)
-        at = int(np.argmin(by_kappa.total))
-        return best, by_kappa.psi[:, at], kappas[at], robust_scale(dense.seen(by_kappa.size[at]))
+        best = int(np.argmin(solve_lobe(dense, slice(None), kappa, scale).total))
+        by_kappa = solve_lobe(dense, slice(best, best + 1), kappas, scale)
+        index = int(np.argmin(by_kappa.total))
+        return best, by_kappa.psi[:, index], kappas[index], robust_scale(dense.seen(by_kappa.size[index]))
 
     # From a middling kappa, then from the one found, and with the scale of the fit, or every outlier of the poor start
     # would count as noise. Once more under the spread of what is reflected, where near widths compare more calmly.
     _, _, kappa, scale = step(dense, kappas[len(kappas) // 2], scale)
-    best, shown, kappa, scale = step(dense, kappa, scale)
+    best, lobe_psi, kappa, scale = step(dense, kappa, scale)
     if dense.spread is None:
-        dense = dense.expecting(float(dense.grid[best]), shown, scale)
+        dense = dense.expecting(float(dense.grid[best]), lobe_psi, scale)
         best, _, kappa, scale = step(dense, kappa, scale)
     near = slice(max(best - 1, 0), best + 2)
-    found = solved(dense, near, kappa, scale)
+    solution = solve_lobe(dense, near, kappa, scale)
     middle = best - near.start
-    root, best_psi = between(np.sqrt(dense.grid[near]), found.total, found.psi, middle)
-    flat = solve(dense, None, kappas, 1.0).size
-    flattest = int(np.argmin((huber(flat, scale) * dense.there).sum((1, 2))))
+    root, best_psi = between(np.sqrt(dense.grid[near]), solution.total, solution.psi, middle)
+    lambertian = solve(dense, None, kappas, 1.0).size
+    lambertian_kappa = int(np.argmin((huber(lambertian, scale) * dense.there).sum((1, 2))))
     return LobeFit(
         phi=float(min(max(root**2, dense.grid[0]), dense.grid[-1])),
         psi=best_psi,
         kappa=kappa,
-        kappa_lambertian=kappas[flattest],
-        residual=float(np.median(dense.seen(found.size[middle]))),
-        residual_lambertian=float(np.median(dense.seen(flat[flattest]))),
+        kappa_lambertian=kappas[lambertian_kappa],
+        residual=float(np.median(dense.seen(solution.size[middle]))),
+        residual_lambertian=float(np.median(dense.seen(lambertian[lambertian_kappa]))),
     )
 
 
@@ -240,8 +243,8 @@ def between(x: np.ndarray, cost: np.ndarray, psi: np.ndarray, middle: int) -> tu
     if curve <= 0:
         return float(x[1]), psi[:, 1]
     slope = (right * (x[1] - x[0]) + left * (x[2] - x[1])) / (x[2] - x[0])
-    at = float(np.clip(x[1] - slope / (2 * curve), (x[0] + x[1]) / 2, (x[1] + x[2]) / 2))
-    return at, np.array([np.interp(at, x, channel) for channel in psi])
+    minimum = float(np.clip(x[1] - slope / (2 * curve), (x[0] + x[1]) / 2, (x[1] + x[2]) / 2))
+    return minimum, np.array([np.interp(minimum, x, channel) for channel in psi])
 
 
 def held_out_costs(
@@ -252,13 +255,13 @@ def held_out_costs(
     phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
     what a lobe must gain.
     """
-    at = dense.at(fit.phi)
-    psi = solve(dense.part(train), at, fit.kappa, scale, constraints=constraints).psi[:, 0]
+    phi_slice = dense.at(fit.phi)
+    psi = solve(dense.part(train), phi_slice, fit.kappa, scale, constraints=constraints).psi[:, 0]
     return element_costs(dense.part(~train), replace(fit, psi=psi), scale)
 
 
 def element_costs(dense: DenseProblem, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
-    at = dense.at(fit.phi)
-    lobe = solve(dense, at, fit.kappa, scale, psi=fit.psi).cost[0]
+    phi_slice = dense.at(fit.phi)
+    lobe = solve(dense, phi_slice, fit.kappa, scale, psi=fit.psi).cost[0]
     return lobe, solve(dense, None, fit.kappa_lambertian, scale).cost[0]

@@ -90,7 +90,7 @@ class DenseProblem:
         self._order, self._shape = order, shape
         self.there = self._laid(np.ones(self.count, np.float32))
         mean = np.bincount(group, problem.radiance[order].mean(1), shape[1]) / views
-        # with a floor at a tenth of the object's level
+        # With a floor at a tenth of the object's level.
         self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
         self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
         self.I = self._laid(problem.radiance.T)[:, None] / level
@@ -148,8 +148,8 @@ class DenseProblem:
         scale : float
             Standard deviation of the residual with no lobe, relative to the element's level.
         """
-        shown = (np.asarray(psi, np.float32)[:, :, None, None] * lobe.A + lobe.B).mean(0)
-        return _spread(shown - np.where(self.there > 0, shown, np.inf).min(1, keepdims=True), scale)
+        visible = (np.asarray(psi, np.float32)[:, :, None, None] * lobe.A + lobe.B).mean(0)
+        return _spread(visible - np.where(self.there > 0, visible, np.inf).min(1, keepdims=True), scale)
 
     def expecting(self, phi: float, psi: np.ndarray, scale: float) -> DenseProblem:
         """The same with one `spread` for all hypotheses, which are compared so: by all that a lobe shows.
@@ -160,10 +160,10 @@ class DenseProblem:
         scale : float
             See `own_spread`.
         """
-        lobe, other = self.lobe(self.at(phi)), copy.copy(self)
-        shown = np.asarray(psi, np.float32)[:, None, None] * lobe.A[:, 0] + lobe.B[:, 0]
-        other.spread = _spread(shown.mean(0), scale)
-        return other
+        lobe, dense = self.lobe(self.at(phi)), copy.copy(self)
+        visible = np.asarray(psi, np.float32)[:, None, None] * lobe.A[:, 0] + lobe.B[:, 0]
+        dense.spread = _spread(visible.mean(0), scale)
+        return dense
 
     def part(self, chosen: np.ndarray) -> DenseProblem:
         """The same for some elements, (g,) bool."""
@@ -177,6 +177,6 @@ class DenseProblem:
         return part
 
 
-def _spread(shown: np.ndarray, scale: float) -> np.ndarray:
-    """Spread of observations that show so much of a lobe, whose light is known up to a share of itself."""
-    return np.sqrt(1 + np.square(np.float32(LOBE_FIT.light_error / scale) * shown))
+def _spread(visible: np.ndarray, scale: float) -> np.ndarray:
+    """Spread of observations that show a lobe's radiance `visible`, known up to a share of itself."""
+    return np.sqrt(1 + np.square(np.float32(LOBE_FIT.light_error / scale) * visible))

@@ -23,14 +23,14 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
     E, density = np.zeros((len(element), len(groups))), np.zeros(len(field.mesh.triangles), np.float32)
     for k, objects in enumerate(groups):
         alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1)
-        lit = field.with_light(alone, Environment.dark(), objects)
-        aimed = shining(lit)
+        lit_alone = field.with_light(alone, Environment.dark(), objects)
+        aimed = shining(lit_alone)
         density[aimed.triangle] = aimed.density[aimed.triangle]
 
-        def aim(part: slice, k: int = k, lit: LightField = lit, aimed: BrightTriangles = aimed) -> None:
-            p, n, own = position[part], normal[part], seed + part.start
-            E[part, k] = direct(lit, aimed, p, n, rays, emitter_rays, own)[0][:, 0]
-            E[part, k] += direct_over_mirrors(lit, aimed, p, n, emitter_rays, own)[:, 0]
+        def aim(part: slice, k: int = k, lit_alone: LightField = lit_alone, aimed: BrightTriangles = aimed) -> None:
+            p, n, block_seed = position[part], normal[part], seed + part.start
+            E[part, k] = direct(lit_alone, aimed, p, n, rays, emitter_rays, block_seed)[0][:, 0]
+            E[part, k] += direct_over_mirrors(lit_alone, aimed, p, n, emitter_rays, block_seed)[:, 0]
 
         for_blocks(aim, len(element), ELEMENTS_AT_ONCE, 0)
     group_of, patterns = _group_of(field, groups), cosine_patterns(rays, seed)
@@ -40,14 +40,14 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
         directions, cosine = turned(patterns, n, np.random.default_rng(seed + part.start))
         directions = directions.reshape(-1, 3)
         hits = field.scene.intersect(np.repeat(field.scene.off_surface(p, n), rays, 0), directions)
-        met = np.flatnonzero((hits.triangle >= 0) & (group_of[hits.triangle] >= 0))
-        triangle = hits.triangle[met]
-        facing = -np.einsum("ij,ij->i", directions[met], field.normal[triangle])
-        aimed = density[triangle] * hits.distance[met] ** 2 / np.maximum(np.abs(facing), 1e-6)
+        hit = np.flatnonzero((hits.triangle >= 0) & (group_of[hits.triangle] >= 0))
+        triangle = hits.triangle[hit]
+        facing = -np.einsum("ij,ij->i", directions[hit], field.normal[triangle])
+        aimed = density[triangle] * hits.distance[hit] ** 2 / np.maximum(np.abs(facing), 1e-6)
         # Lamps are dark from behind.
-        value = np.pi / rays * balance(rays * cosine.ravel()[met], emitter_rays * aimed) * (facing > 0)
-        at = met // rays * len(groups) + group_of[triangle]
-        E[part] += np.bincount(at, value, len(p) * len(groups)).reshape(len(p), len(groups))
+        value = np.pi / rays * balance(rays * cosine.ravel()[hit], emitter_rays * aimed) * (facing > 0)
+        cell = hit // rays * len(groups) + group_of[triangle]
+        E[part] += np.bincount(cell, value, len(p) * len(groups)).reshape(len(p), len(groups))
 
     if groups:
         for_blocks(gather, len(element), ELEMENTS_AT_ONCE, 0)
@@ -62,16 +62,16 @@ def reaching_most(field: LightField, element: np.ndarray, groups: list[list[int]
     group_of = _group_of(field, groups)
     position, normal = field.atlas.position[element], field.atlas.normal[element]
     patterns, rng = cosine_patterns(LIGHT_FIT.emitter_rays, seed), np.random.default_rng(seed)
-    met = np.zeros(len(groups))
+    hit_count = np.zeros(len(groups))
 
     def run(part: slice) -> None:
         start = np.repeat(field.scene.off_surface(position[part], normal[part]), LIGHT_FIT.emitter_rays, 0)
         triangle = field.scene.intersect(start, turned(patterns, normal[part], rng)[0].reshape(-1, 3)).triangle
         group = group_of[triangle[triangle >= 0]]
-        np.add.at(met, group[group >= 0], 1)
+        np.add.at(hit_count, group[group >= 0], 1)
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 1)
-    return np.sort(np.argsort(-met, kind="stable")[:count]).tolist()
+    return np.sort(np.argsort(-hit_count, kind="stable")[:count]).tolist()
 
 
 def _group_of(field: LightField, groups: list[list[int]]) -> np.ndarray:

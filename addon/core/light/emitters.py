@@ -47,8 +47,8 @@ def triangle_luminance(field: LightField) -> np.ndarray:
     luminance = field.radiance @ LUMINANCE
     t = len(field.mesh.triangles)
     mean = np.bincount(atlas.triangle, luminance, t) / np.maximum(np.bincount(atlas.triangle, minlength=t), 1)
-    bare, beside = field.lookup.bare
-    mean[bare] = luminance[beside]
+    bare, neighbour = field.lookup.bare
+    mean[bare] = luminance[neighbour]
     return mean
 
 
@@ -65,8 +65,8 @@ def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
     luminance = triangle_luminance(field)
     bright = np.flatnonzero((luminance > above) & (luminance * area > 0))
     power = luminance[bright] * area[bright]
-    most = np.sort(np.argsort(-power)[: GATHER.max_triangles])
-    bright, power = bright[most], power[most]
+    strongest = np.sort(np.argsort(-power)[: GATHER.max_triangles])
+    bright, power = bright[strongest], power[strongest]
     chance = power / max(power.sum(), 1e-30)
     density = np.zeros(len(area), np.float32)
     density[bright] = chance / area[bright]
@@ -92,10 +92,10 @@ def aimed_at(
     (m,) int, (m,) float32
     """
     density = bright.density.take(hits.triangle)  # of an escaped ray that of the last triangle; taken out below
-    on = np.flatnonzero((density > 0) & (hits.triangle >= 0))
-    normal = triangle_normal.take(hits.triangle.take(on), 0)
-    cosine = np.abs(np.einsum("ij,ij->i", directions.take(on, 0), normal))
-    return on, density.take(on) * hits.distance.take(on) ** 2 / np.maximum(cosine, 1e-6)
+    hit = np.flatnonzero((density > 0) & (hits.triangle >= 0))
+    normal = triangle_normal.take(hits.triangle.take(hit), 0)
+    cosine = np.abs(np.einsum("ij,ij->i", directions.take(hit, 0), normal))
+    return hit, density.take(hit) * hits.distance.take(hit) ** 2 / np.maximum(cosine, 1e-6)
 
 
 def aimed_density(
@@ -104,8 +104,8 @@ def aimed_density(
     """The density of `aimed_at` for every ray, (n,) float32; 0 where no bright triangle was met."""
     density = np.zeros(len(directions), np.float32)
     if len(bright):
-        on, aimed = aimed_at(bright, hits, directions, triangle_normal)
-        density[on] = aimed
+        hit, aimed = aimed_at(bright, hits, directions, triangle_normal)
+        density[hit] = aimed
     return density
 
 

@@ -15,7 +15,7 @@ from .params import LIGHT_FIT, SKY
 NEAR = np.radians(8)
 """Angle over which what was seen of the sky says something of its surroundings."""
 BESIDE = np.radians(3)
-"""Angle over which it goes on as it was seen."""
+"""Angle over which it continues as it was seen."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Zone:
     pattern : (h, 2h) float32
         Its radiance at a mean of 1, times the weight.
     told : bool
-        Frames tell radiance on its side of the horizon.
+        Frames show radiance on its side of the horizon.
     clipped : bool
         Of what frames saw of it only a lower bound is known.
     """
@@ -40,15 +40,15 @@ class Zone:
     clipped: bool = False
 
 
-def _solid(weight: np.ndarray) -> np.ndarray:
-    """Weights ((h, 2h)) times what each row covers of the sphere."""
+def _by_solid_angle(weight: np.ndarray) -> np.ndarray:
+    """Weights ((h, 2h)) times the relative solid angle of each row."""
     height = len(weight)
     return np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None] * weight
 
 
 def _levelled(pattern: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The pattern, scaled so that its mean over the weights is 1."""
-    return (pattern * (_solid(weight).sum() / max(_solid(pattern).sum(), 1e-20))).astype(np.float32)
+    return (pattern * (_by_solid_angle(weight).sum() / max(_by_solid_angle(pattern).sum(), 1e-20))).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Environment:
 
     @property
     def told(self) -> np.ndarray:
-        """Directions whose radiance frames tell: seen, and not clipped; (h, 2h) bool."""
+        """Directions whose radiance frames show: seen, and not clipped; (h, 2h) bool."""
         return (self.observations > 0) & ~self.clipped
 
     @staticmethod
@@ -113,8 +113,8 @@ class Environment:
         wide = self._wide(seen)
         if not wide.any():
             return (~seen).astype(np.float32)
-        away = self._to(wide)[0]
-        return np.where(seen, 0, 1 - np.exp(-((away / BESIDE) ** 2))).astype(np.float32)
+        distance = self._to(wide)[0]
+        return np.where(seen, 0, 1 - np.exp(-((distance / BESIDE) ** 2))).astype(np.float32)
 
     def _wide(self, chosen: np.ndarray) -> np.ndarray:
         """Those of some directions ((h, 2h) bool) that are of spots at least three cells wide."""
@@ -124,10 +124,10 @@ class Environment:
     def _to(self, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radians from each direction to the nearest that was `seen` ((h, 2h) bool), and its flat index."""
         height, width = seen.shape
-        wide = np.concatenate([~seen] * 3, 1)  # directions wrap around
-        away, (row, column) = ndimage.distance_transform_edt(wide, return_indices=True)
+        tiled = np.concatenate([~seen] * 3, 1)  # directions wrap around
+        distance, (row, column) = ndimage.distance_transform_edt(tiled, return_indices=True)
         middle = np.s_[:, width : 2 * width]
-        return away[middle] * (np.pi / height), (row * width + column % width)[middle]
+        return distance[middle] * (np.pi / height), (row * width + column % width)[middle]
 
     def clipped_parts(self, angle: float) -> np.ndarray:
         """Parts of what is clipped, cells of so many radians either way; (h, 2h) int from 0, -1 where it is not.
@@ -141,8 +141,8 @@ class Environment:
         part = np.full(height * width, -1)
         chosen = self.clipped.ravel()
         if chosen.any():
-            name = (row // cell * width + column // cell).ravel()[chosen]
-            part[chosen] = np.unique(name, return_inverse=True)[1].ravel()
+            cell_number = (row // cell * width + column // cell).ravel()[chosen]
+            part[chosen] = np.unique(cell_number, return_inverse=True)[1].ravel()
         part, known = part.reshape(height, width), self.clipped | self._wide(self.told)
         return np.where(self.observations > 0, part, part.ravel()[self._to(known)[1]]) if known.any() else part
 
@@ -170,14 +170,16 @@ class Environment:
 
     def mean_of(self, part: np.ndarray, count: int) -> np.ndarray:
         """Mean of what is clipped in each `part` of so many, (count, 3) float64."""
-        weight = _solid(self.clipped)
-        own = np.where(self.clipped, part, count).ravel()
-        total = np.bincount(own, weight.ravel(), count + 1)[:count]
-        summed = [np.bincount(own, (weight * self.radiance[..., k]).ravel(), count + 1)[:count] for k in range(3)]
+        weight = _by_solid_angle(self.clipped)
+        part_of_cell = np.where(self.clipped, part, count).ravel()
+        total = np.bincount(part_of_cell, weight.ravel(), count + 1)[:count]
+        summed = [
+            np.bincount(part_of_cell, (weight * self.radiance[..., k]).ravel(), count + 1)[:count] for k in range(3)
+        ]
         return np.stack(summed, 1) / np.maximum(total, 1e-20)[:, None]
 
     def unknown_zones(self) -> list[Zone]:
-        """The directions above and below the horizon that frames don't tell; last, what of the rest they clipped.
+        """The directions above and below the horizon that frames don't show; last, what of the rest they clipped.
 
         The weight is `strange`. Within a zone radiance goes with the height as it does where the
         frames saw it: skies change more with the height than around. Where frames clipped most of what they saw on a
@@ -186,26 +188,26 @@ class Environment:
         weight, height = self.strange, len(self.observations)
         above = (np.arange(height) >= height / 2)[:, None]
         profile = self._profile()[:, None]
-        zones, left = [], self.clipped
+        zones, remaining = [], self.clipped
         for side in (above, ~above):
-            own, told = np.where(side, weight, np.float32(0)), self.told & side
-            if _solid(self.clipped & side).sum() > _solid(told).sum():
-                own, left = np.where(side & self.clipped, np.float32(1), own), left & ~side
-                zones.append(Zone(own, own, clipped=True))
-            elif own.any():
-                zones.append(Zone(own, _levelled(own * profile, own), bool(told.any())))
-        if left.any():
-            zones.append(Zone(left.astype(np.float32), left.astype(np.float32), clipped=True))
+            zone_weight, known = np.where(side, weight, np.float32(0)), self.told & side
+            if _by_solid_angle(self.clipped & side).sum() > _by_solid_angle(known).sum():
+                zone_weight, remaining = np.where(side & self.clipped, np.float32(1), zone_weight), remaining & ~side
+                zones.append(Zone(zone_weight, zone_weight, clipped=True))
+            elif zone_weight.any():
+                zones.append(Zone(zone_weight, _levelled(zone_weight * profile, zone_weight), bool(known.any())))
+        if remaining.any():
+            zones.append(Zone(remaining.astype(np.float32), remaining.astype(np.float32), clipped=True))
         return zones
 
     def _profile(self) -> np.ndarray:
         """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
         height = len(self.observations)
-        known = self.told
-        rows = np.flatnonzero(known.any(1))
+        observed = self.told
+        rows = np.flatnonzero(observed.any(1))
         if not len(rows):
             return np.ones(height, np.float32)
-        level = [np.median(self.radiance[row, known[row]].mean(1)) for row in rows]
+        level = [np.median(self.radiance[row, observed[row]].mean(1)) for row in rows]
         profile = np.interp(np.arange(height), rows, level)
         profile = ndimage.gaussian_filter1d(profile, np.radians(SKY.profile) / np.pi * height, mode="nearest")
         middle = max(float(np.median(profile[rows])), 1e-12)
@@ -213,7 +215,7 @@ class Environment:
 
     def zone_mean(self, zone: Zone) -> np.ndarray:
         """Mean radiance over a zone, weighted by solid angle: (3,) float32."""
-        share = _solid(zone.weight)
+        share = _by_solid_angle(zone.weight)
         return (self.radiance * share[..., None]).sum((0, 1)) / max(share.sum(), 1e-12)
 
     def with_zone(self, zone: Zone, radiance: np.ndarray) -> Environment:
@@ -230,17 +232,17 @@ class Environment:
         """Unit directions through the middles of the map's cells, (height * width, 3) float32: `_bin`'s inverse."""
         height, width = self.radiance.shape[:2]
         row, column = np.mgrid[:height, :width] + 0.5
-        around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
-        level = np.cos(up)
-        away = np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1)
-        return away.reshape(-1, 3).astype(np.float32)
+        longitude, latitude = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
+        cosine = np.cos(latitude)
+        directions = np.stack([cosine * np.cos(longitude), cosine * np.sin(longitude), np.sin(latitude)], -1)
+        return directions.reshape(-1, 3).astype(np.float32)
 
     def refilled(self, radiance: np.ndarray) -> Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""
         return Environment(_filled(radiance, self.observations), self.observations, self.clipped)
 
     def known(self, directions: np.ndarray) -> np.ndarray:
-        """Whether frames tell the radiance from unit `directions` ((n, 3)), (n,) bool."""
+        """Whether frames show the radiance from unit `directions` ((n, 3)), (n,) bool."""
         return self.at(self.told, directions)
 
 
@@ -256,8 +258,8 @@ def _bin(directions: np.ndarray, height: int) -> np.ndarray:
 def _filled(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Unseen directions from seen ones; those below the horizon from below it, those above it from above.
 
-    The ground's radiance says nothing of the sky's. Filled in across the horizon, what light told of the ground was
-    .73, .55 and a third (its bound) of the guess in three rooms, and where it could not tell .9 stood for .5.
+    The ground's radiance says nothing of the sky's. Filled in across the horizon, what the light showed of the ground
+    was .73, .55 and a third (its bound) of the guess in three rooms, and where it showed nothing .9 stood for .5.
     """
     half = len(weight) // 2
     if not half or not (weight[:half] > 0).any() or not (weight[half:] > 0).any():
@@ -275,8 +277,8 @@ def _fill(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
         return np.where(weight[..., None] > 0, radiance, mean).astype(np.float32)
     seen = (weight > 0).astype(np.float32)
     small_weight = seen.reshape(height // 2, 2, width // 2, 2).sum((1, 3))
-    summed = (radiance * seen[..., None]).reshape(height // 2, 2, width // 2, 2, 3).sum((1, 3))
-    small = _fill(summed / np.maximum(small_weight, 1)[..., None], small_weight)
+    small_sum = (radiance * seen[..., None]).reshape(height // 2, 2, width // 2, 2, 3).sum((1, 3))
+    small = _fill(small_sum / np.maximum(small_weight, 1)[..., None], small_weight)
     return np.where(seen[..., None] > 0, radiance, small.repeat(2, 0).repeat(2, 1)).astype(np.float32)
 
 
@@ -290,8 +292,8 @@ class EnvironmentAccumulator:
     """
 
     def __init__(self, pixel_angle: float):
-        wanted = np.pi / max(pixel_angle, 1e-6)
-        self._height = int(min(SKY.max_height, 2 ** np.round(np.log2(max(wanted, 16)))))
+        height = np.pi / max(pixel_angle, 1e-6)
+        self._height = int(min(SKY.max_height, 2 ** np.round(np.log2(max(height, 16)))))
         cells = 2 * self._height**2
         self._sum = np.zeros((cells, 3))
         self._count = np.zeros(cells, np.int64)
@@ -309,9 +311,9 @@ class EnvironmentAccumulator:
         np.maximum.at(self._bound, cells[clipped], radiance[clipped])
         np.add.at(self._bounds, cells[clipped], 1)
         # Of the frame's cells alone: sums over the whole map took four times as long.
-        met, index = np.unique(cells[~clipped], return_inverse=True)
-        self._sum[met] += np.stack([np.bincount(index, plane, len(met)) for plane in radiance[~clipped].T], -1)
-        self._count[met] += np.bincount(index, minlength=len(met))
+        used, index = np.unique(cells[~clipped], return_inverse=True)
+        self._sum[used] += np.stack([np.bincount(index, plane, len(used)) for plane in radiance[~clipped].T], -1)
+        self._count[used] += np.bincount(index, minlength=len(used))
 
     def result(self) -> Environment:
         """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound.

@@ -22,8 +22,11 @@ def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.nda
     rng = np.random.default_rng(seed)
     element = np.flatnonzero(good)
     groups = by_label(field.atlas.object_id[element])
-    each = max(samples // len(groups), 50)
-    chosen = [own if len(own) <= each else rng.choice(own, each, replace=False) for own in (element[g] for g in groups)]
+    per_object = max(samples // len(groups), 50)
+    chosen = [
+        members if len(members) <= per_object else rng.choice(members, per_object, replace=False)
+        for members in (element[g] for g in groups)
+    ]
     return np.sort(np.concatenate(chosen))
 
 
@@ -51,14 +54,14 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     luminance, atlas = field.radiance @ LUMINANCE, field.atlas
     seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
     level = GATHER.bright * float((luminance * atlas.weight).sum() / max(atlas.weight.sum(), 1e-30))
-    shown = np.flatnonzero(seen)
-    groups = by_number(atlas.object_id[shown])
-    bright = [i for i, own in groups.items() if np.median(luminance[shown[own]]) > level]
+    index = np.flatnonzero(seen)
+    groups = by_number(atlas.object_id[index])
+    bright = [i for i, members in groups.items() if np.median(luminance[index[members]]) > level]
     return seen & np.isin(atlas.object_id, bright)
 
 
 def evened(field: LightField) -> np.ndarray:
-    """L_d with what is likely sent where nobody saw an element, (n, 3) float32: it is dark there in `field`.
+    """L_d with the likely radiance of elements that nobody saw, (n, 3) float32: they are dark in `field`.
 
     The field's `unseen`, else the median of its object; nothing where nobody saw anything of the object.
     """
@@ -68,10 +71,10 @@ def evened(field: LightField) -> np.ndarray:
         fill = ~seen & (np.bincount(object_id, seen) > 0)[object_id]
         radiance[fill] = field.unseen[fill]
         return radiance
-    for own in by_label(object_id):
-        known = seen[own]
+    for members in by_label(object_id):
+        known = seen[members]
         if known.any() and not known.all():
-            radiance[own[~known]] = np.median(radiance[own[known]], 0)
+            radiance[members[~known]] = np.median(radiance[members[known]], 0)
     return radiance
 
 
@@ -82,11 +85,11 @@ def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarr
     E = np.empty((len(element), 3))
 
     def run(part: slice) -> None:
-        p, n, own = position[part], normal[part], seed + part.start
-        around, _, _ = gather(
-            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own, portals, LIGHT_FIT.emitter_rays
+        p, n, block_seed = position[part], normal[part], seed + part.start
+        indirect, _, _ = gather(
+            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, block_seed, portals, LIGHT_FIT.emitter_rays
         )
-        E[part] = around + direct(field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own + 1)[0]
+        E[part] = indirect + direct(field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, block_seed + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
     return E + from_sun(field, element)
@@ -102,5 +105,5 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
 
 def most_reflected(field: LightField, objects: list[int], seed: int) -> float:
     """Luminance that objects would send out at an albedo of `EMITTER_ALBEDO`, in the median over their elements."""
-    own = pick(field, np.isin(field.atlas.object_id, objects), seed, LEVELS.of_object)
-    return LIGHT_FIT.emitter_albedo / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))
+    elements = pick(field, np.isin(field.atlas.object_id, objects), seed, LEVELS.of_object)
+    return LIGHT_FIT.emitter_albedo / np.pi * float(np.median(irradiance_at(field, elements, seed) @ LUMINANCE))

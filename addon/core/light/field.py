@@ -50,7 +50,7 @@ class LightField:
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
         self.normal, _ = mesh.geometry
-        self._say_lamps(lamps)
+        self._set_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
         self.sun: Sun | None = None
         self.openings: Openings | None = None
@@ -79,19 +79,19 @@ class LightField:
         self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
     ) -> LightField:
         """The same room with another L_d and, if given, another environment and other lamps."""
-        other = self._with(
+        field = self._with(
             radiance=np.ascontiguousarray(radiance, np.float32), environment=environment or self.environment
         )
         if lamps is not None:
-            other._say_lamps(lamps)
-        return other
+            field._set_lamps(lamps)
+        return field
 
     def _with(self, **changed: Any) -> LightField:
-        other = copy.copy(self)
-        vars(other).update(changed)
-        return other
+        field = copy.copy(self)
+        vars(field).update(changed)
+        return field
 
-    def _say_lamps(self, lamps: Iterable[int]) -> None:
+    def _set_lamps(self, lamps: Iterable[int]) -> None:
         self.one_sided = np.isin(self.mesh.object_id, list(lamps))
         self._lamps = bool(self.one_sided.any())
         if self.mesh.backs is not None:  # rays meet no side from behind, but are aimed at points on either
@@ -99,11 +99,11 @@ class LightField:
             self.one_sided[len(self.mesh.triangles) - len(self.mesh.backs) :] = True
 
     def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
-        """The same room with flat mirrors that rays go on from."""
+        """The same room with flat mirrors that reflect rays."""
         mirror_of = np.full(len(self.mesh.triangles), -1, np.int8)
         for i, mirror in enumerate(mirrors):
-            flat = np.abs(self.normal @ mirror.normal) > FLAT
-            mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
+            parallel = np.abs(self.normal @ mirror.normal) > FLAT
+            mirror_of[parallel & (self.mesh.object_id == mirror.object_id)] = i
         return self._with(mirrors=mirrors, mirror_of=mirror_of)
 
     def with_sun(self, sun: Sun | None) -> LightField:
@@ -111,7 +111,7 @@ class LightField:
         return self._with(sun=sun)
 
     def with_unseen(self, radiance: np.ndarray) -> LightField:
-        """The same room with what is likely sent, (n, 3) float32, where no frame looked and so its own is dark."""
+        """The same room with the likely radiance, (n, 3) float32, of elements that no frame saw, which are dark."""
         return self._with(unseen=radiance)
 
     def with_openings(self, openings: Openings | None) -> LightField:
@@ -184,9 +184,11 @@ class LightField:
         """
         radiance = self._sent(hits, element, directions, origins)
         if self.mirrors:
-            seen = np.flatnonzero((self.mirror_of.take(hits.triangle) >= 0) & (element >= 0))
-            if len(seen):
-                radiance[seen] = self._mirrored(hits.part(seen), directions.take(seen, 0), dark_in_mirrors)
+            on_mirrors = np.flatnonzero((self.mirror_of.take(hits.triangle) >= 0) & (element >= 0))
+            if len(on_mirrors):
+                radiance[on_mirrors] = self._mirrored(
+                    hits.part(on_mirrors), directions.take(on_mirrors, 0), dark_in_mirrors
+                )
         return radiance
 
     def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None) -> np.ndarray:
@@ -204,15 +206,15 @@ class LightField:
         return radiance
 
     def onward(self, hits: Hits, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Origins and directions of rays that go on from mirrors that they hit, and these mirrors' F0, (n, 3) each."""
+        """Origins and directions of rays reflected by the mirrors that they hit, and the mirrors' F0, (n, 3) each."""
         a, b, c = (self.mesh.vertices.take(corner, 0) for corner in self.mesh.triangles.take(hits.triangle, 0).T)
         u, v = hits.u[:, None], hits.v[:, None]
-        turn = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
+        point = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
         normal = self.normal.take(hits.triangle, 0)
-        along = np.einsum("ij,ij->i", directions, normal)[:, None]
+        cosine = np.einsum("ij,ij->i", directions, normal)[:, None]
         f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
-        origins = self.scene.off_surface(turn, -np.sign(along) * normal)
-        return origins, directions - 2 * along * normal, f0.take(self.mirror_of.take(hits.triangle), 0)
+        origins = self.scene.off_surface(point, -np.sign(cosine) * normal)
+        return origins, directions - 2 * cosine * normal, f0.take(self.mirror_of.take(hits.triangle), 0)
 
     def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
         """What a mirror that was hit shows; a second mirror shows its L_d."""

@@ -46,10 +46,10 @@ def _bound(points: _Points, index: np.ndarray, position: np.ndarray, normal: np.
     No point reaches further than about two of the present spacings: where a level was found too coarse, its points
     must not outweigh the finer ones between them.
     """
-    away = points.position[index] - position[:, None]
-    distance = np.sqrt(np.einsum("nkj,nkj->nk", away, away))
-    turned = np.maximum(1 - np.einsum("nkj,nj->nk", points.normal[index], normal), 0)
-    return distance / np.minimum(points.radius[index], 2 * spacing / GATHER.allowed) + np.sqrt(turned)
+    offset = points.position[index] - position[:, None]
+    distance = np.sqrt(np.einsum("nkj,nkj->nk", offset, offset))
+    normal_term = np.maximum(1 - np.einsum("nkj,nj->nk", points.normal[index], normal), 0)
+    return distance / np.minimum(points.radius[index], 2 * spacing / GATHER.allowed) + np.sqrt(normal_term)
 
 
 def interpolated(
@@ -128,23 +128,23 @@ def _spread(
     covered = np.zeros(len(todo), bool)
 
     def fill(part: slice) -> None:
-        at = todo[part]
-        p, n = position[at], normal[at]
+        elements = todo[part]
+        p, n = position[elements], normal[elements]
         _, index = tree.query(np.concatenate([p / spacing, n * GATHER.turn], 1), k=k)
         index = index.reshape(len(p), k)
         bound = _bound(points, index, p, n, spacing)
         weight = np.maximum(1 - bound / REACH, 0) ** 2
         # Where nothing is near enough, the best of what there is.
-        lost = weight.sum(1) <= 1e-6
-        weight[lost, bound[lost].argmin(1)] = 1
+        uncovered = weight.sum(1) <= 1e-6
+        weight[uncovered, bound[uncovered].argmin(1)] = 1
         weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
-        near = points.value[index]
-        result[at] = np.einsum("nk,nkc->nc", weight, near)
+        values = points.value[index]
+        result[elements] = np.einsum("nk,nkc->nc", weight, values)
         # Ward's bound knows how near the walls are, not how bright: what the points themselves say decides too.
-        level = near[..., :3].mean(2)
+        level = values[..., :3].mean(2)
         mean = np.einsum("nk,nk->n", weight, level)
-        contrast[at] = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
-        covered[part] = (bound.min(1) <= GATHER.allowed) & (contrast[at] <= GATHER.contrast)
+        contrast[elements] = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
+        covered[part] = (bound.min(1) <= GATHER.allowed) & (contrast[elements] <= GATHER.contrast)
 
     for_blocks(fill, len(todo), BLOCK, threads)
     return covered

@@ -69,18 +69,18 @@ def gather(
         radiance = field.arriving(
             hits, field.elements(hits), directions, bright.density if emitter_rays else None, origins
         )
-        out = hits.triangle < 0
+        escapes = hits.triangle < 0
         if emitter_rays and len(bright):
-            on, aimed = aimed_at(bright, hits, directions, field.normal)
-            radiance[on] *= balance(rays * cosine[on], emitter_rays * aimed)[:, None]
+            index, aimed = aimed_at(bright, hits, directions, field.normal)
+            radiance[index] *= balance(rays * cosine[index], emitter_rays * aimed)[:, None]
         if portals is not None and portal_rays:
-            on = np.flatnonzero(out)
-            density = portals.aimed_density(origins[on], directions[on])
-            radiance[on] *= balance(rays * cosine[on], portal_rays * density)[:, None]
+            index = np.flatnonzero(escapes)
+            density = portals.aimed_density(origins[index], directions[index])
+            radiance[index] *= balance(rays * cosine[index], portal_rays * density)[:, None]
         total[part] = np.float32(np.pi / rays) * np.einsum("nkc->nc", radiance.reshape(len(p), rays, 3))
-        near = np.einsum("nk->n", 1 / np.maximum(hits.distance, 1e-9).reshape(len(p), rays))
-        radius[part] = rays / np.maximum(near, 1e-20)
-        escaped[part] = out.reshape(len(p), rays).mean(1)
+        inverse_distance = np.einsum("nk->n", 1 / np.maximum(hits.distance, 1e-9).reshape(len(p), rays))
+        radius[part] = rays / np.maximum(inverse_distance, 1e-20)
+        escaped[part] = escapes.reshape(len(p), rays).mean(1)
     if portals is not None and portal_rays:
         total += from_outside(field, portals, position, normal, rays, portal_rays, seed)
     if emitter_rays and field.mirrors:
@@ -90,8 +90,8 @@ def gather(
 
 def balance(cosine_rays: np.ndarray, aimed: np.ndarray) -> np.ndarray:
     """The balance heuristic's weight of cosine-distributed rays, (n,); `aimed` is rays times density."""
-    own = cosine_rays / np.float32(np.pi)
-    return own / np.maximum(own + aimed, 1e-20)
+    density = cosine_rays / np.float32(np.pi)
+    return density / np.maximum(density + aimed, 1e-20)
 
 
 def from_outside(
@@ -184,8 +184,8 @@ def direct(
         share = emitter_rays * aimed + rays * cosine / np.float32(np.pi)
         weight = np.zeros(distance.shape, np.float32)
         weight[row, ray] = cosine / np.maximum(share, 1e-20)
-        shown = light[pattern]
-        total[part] = np.matmul(weight[:, None], shown)[:, 0]
+        radiance = light[pattern]
+        total[part] = np.matmul(weight[:, None], radiance)[:, 0]
         weight[:, emitter_rays // 2 :] *= -1
-        noise[part] = GATHER.both_halves * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
+        noise[part] = GATHER.both_halves * np.abs(np.matmul(weight[:, None], radiance)[:, 0]).mean(1)
     return total, noise

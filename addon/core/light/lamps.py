@@ -47,16 +47,16 @@ class Lamp:
         if self.seen:
             return "Clipped in every frame; its radiance is a lower bound." if self.clipped else ""
         unseen = "Frames show it only mixed with what is beside it" if self.mixed else "No frame sees it"
-        told = "Clipped in every frame" if self.clipped else unseen
-        told += "; solved from the light it throws"
+        note = "Clipped in every frame" if self.clipped else unseen
+        note += "; solved from the light it throws"
         if self.spread is not None:
             before, after = self.spread
-            told += f" (spread of log albedo {before:.3f} to {after:.3f})"
+            note += f" (spread of log albedo {before:.3f} to {after:.3f})"
         if self.twin is not None:
-            told += (
+            note += (
                 f": {self.solved:.3g}; that of the seen '{names[self.twin]}' explains it nearly as well, and is taken"
             )
-        return f"{told}."
+        return f"{note}."
 
 
 def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:
@@ -71,9 +71,9 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     """
     luminance, received = radiance @ LUMINANCE, irradiance @ LUMINANCE
     lamps = []
-    for one, own in by_number(object_id).items():
-        if np.median(np.pi * luminance[own] / np.maximum(received[own], 1e-12)) > LIGHT_FIT.emitter_albedo:
-            lamps.append(Lamp(one, np.median(radiance[own], 0), True))
+    for number, members in by_number(object_id).items():
+        if np.median(np.pi * luminance[members] / np.maximum(received[members], 1e-12)) > LIGHT_FIT.emitter_albedo:
+            lamps.append(Lamp(number, np.median(radiance[members], 0), True))
     return lamps
 
 
@@ -84,7 +84,7 @@ class LampKinds:
     Attributes
     ----------
     class_of : dict of str
-        The class of each object that the capture tells of; empty where it tells none.
+        The class of each object that the capture names; empty where it gives none.
     model : dict of int
         Of each object the first that would be the same lamp hung once more, or its own number.
     """
@@ -93,16 +93,16 @@ class LampKinds:
     model: dict[int, int]
 
     def classes(self) -> dict[str, list[int]]:
-        """The objects of each class that was told."""
+        """The objects of each class that is known."""
         members: dict[str, list[int]] = {}
-        for one, name in self.class_of.items():
+        for number, name in self.class_of.items():
             if name:
-                members.setdefault(name, []).append(one)
+                members.setdefault(name, []).append(number)
         return members
 
 
 def lamp_kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> LampKinds:
-    """Classes as told, and as models those of a class that are of about one size.
+    """Classes as the capture gives them, and as models those of a class that are of about one size.
 
     Parameters
     ----------
@@ -110,18 +110,18 @@ def lamp_kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) ->
         That a scan had along its normals, in metres.
     """
     size, class_of = radius_of_gyration(mesh), class_names(instances)
-    told = LampKinds(class_of, {one: one for one in class_of})
-    for members in told.classes().values():
+    kinds = LampKinds(class_of, {number: number for number in class_of})
+    for members in kinds.classes().values():
         firsts: list[int] = []
-        for one in members:
-            own = size[one] if one < len(size) else 0.0
-            apart = LIGHT_FIT.same * own + LEVELS.likely * noise
-            like = [i for i in firsts if abs(own - size[i]) <= apart] if own else []
-            if like:
-                told.model[one] = like[0]
-            elif own:
-                firsts.append(one)
-    return told
+        for number in members:
+            radius = size[number] if number < len(size) else 0.0
+            tolerance = LIGHT_FIT.same * radius + LEVELS.likely * noise
+            alike = [i for i in firsts if abs(radius - size[i]) <= tolerance] if radius else []
+            if alike:
+                kinds.model[number] = alike[0]
+            elif radius:
+                firsts.append(number)
+    return kinds
 
 
 def radius_of_gyration(mesh: Mesh) -> np.ndarray:
@@ -132,14 +132,14 @@ def radius_of_gyration(mesh: Mesh) -> np.ndarray:
     area, middle = mesh.geometry[1], mesh.vertices[mesh.triangles].mean(1, dtype=np.float64)
     total = np.maximum(np.bincount(mesh.object_id, area), 1e-30)
     centroid = np.stack([np.bincount(mesh.object_id, area * middle[:, k]) / total for k in range(3)], 1)
-    off = ((middle - centroid[mesh.object_id]) ** 2).sum(1)
-    return np.sqrt(np.bincount(mesh.object_id, area * off) / total)
+    square_distance = ((middle - centroid[mesh.object_id]) ** 2).sum(1)
+    return np.sqrt(np.bincount(mesh.object_id, area * square_distance) / total)
 
 
 def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: LampKinds) -> dict[int, float]:
     """Objects of a class of which most that frames show unmixed are lamps, with the median luminance of those.
 
-    The capture has to tell classes.
+    The capture has to give classes.
 
     Parameters
     ----------
@@ -149,26 +149,26 @@ def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: LampKind
         Objects that have an element whose L_d rests on clean observations, each at least once.
     """
     luminance = {lamp.object_id: float(lamp.radiance @ LUMINANCE) for lamp in lamps}
-    shown = set(np.unique(clean).tolist())
-    found: dict[int, float] = {}
-    for own in kinds.classes().values():
-        seen = shown & set(own)
+    shown_objects = set(np.unique(clean).tolist())
+    luminance_of: dict[int, float] = {}
+    for members in kinds.classes().values():
+        seen = shown_objects & set(members)
         shining = [luminance[i] for i in seen if i in luminance]
         if len(shining) * 2 > len(seen):
-            found |= dict.fromkeys(own, float(np.median(shining)))
-    return found
+            luminance_of |= dict.fromkeys(members, float(np.median(shining)))
+    return luminance_of
 
 
 def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
     """Seen lamps whose radiance no pixel shows unmixed.
 
-    Their pixels hold what is beside them as well. So a lamp's radiance is to be solved for, too, and what only stands
-    beside one is none.
+    Their pixels hold what is beside them as well. So such a lamp's radiance is to be solved for, too, and what only
+    stands beside one is none.
 
     Parameters
     ----------
     clean : (m,) int
         As in `of_shining_class`.
     """
-    shown = set(np.unique(clean).tolist())
-    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown]
+    shown_objects = set(np.unique(clean).tolist())
+    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown_objects]

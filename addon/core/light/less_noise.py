@@ -1,8 +1,8 @@
 """Take the rays' noise out of light over the surface, and leave its edges: Lee's filter with a known noise.
 
-In a cell of the surface light is a plane over the position plus a rest of variance v; the rays' noise has n^2. What is
-kept of an element's rest is max(v - n^2, 0) / v (Lee 1980): where light is smooth the rest is noise and goes, at the
-edge of a shadow it is light and stays. Cells on several shifted grids are averaged, so that none shows.
+In a cell of the surface light is a plane over the position plus a residual of variance v; the rays' noise has n^2.
+What is kept of an element's residual is max(v - n^2, 0) / v (Lee 1980): where light is smooth the residual is noise and
+goes, at the edge of a shadow it is light and stays. Cells on several shifted grids are averaged, so that none shows.
 """
 
 from collections.abc import Iterator
@@ -43,49 +43,49 @@ def less_noise(
         Root mean square over the cells around.
     """
 
-    result, around = np.zeros_like(light), np.zeros(len(light))
+    result, noise_square = np.zeros_like(light), np.zeros(len(light))
 
-    def lessen(portion: tuple[np.ndarray, np.ndarray]) -> None:
-        """Add what is left of the light in some cells, and the mean square of their noise."""
-        own, group = portion
-        light_here, count = light[own], np.bincount(group)
-        fitted = _planes(position[own], light_here, group, count)
-        rest = (light_here - fitted).mean(1)
-        n2, v = (np.bincount(group, x.astype(np.float64) ** 2) / count for x in (noise[own], rest))
-        keep = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
-        result[own] += fitted + keep[group, None].astype(np.float32) * (light_here - fitted)
-        around[own] += n2[group]
+    def filter_cells(portion: tuple[np.ndarray, np.ndarray]) -> None:
+        """Add the filtered light of some cells, and the mean square of their noise."""
+        elements, group = portion
+        cell_light, count = light[elements], np.bincount(group)
+        fitted = _planes(position[elements], cell_light, group, count)
+        residual = (cell_light - fitted).mean(1)
+        n2, v = (np.bincount(group, x.astype(np.float64) ** 2) / count for x in (noise[elements], residual))
+        kept_share = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
+        result[elements] += fitted + kept_share[group, None].astype(np.float32) * (cell_light - fitted)
+        noise_square[elements] += n2[group]
 
     for k in range(LESS_NOISE.grids):
-        for _ in ordered_map(lessen, cells(position, normal, k / LESS_NOISE.grids), threads):
+        for _ in ordered_map(filter_cells, cells(position, normal, k / LESS_NOISE.grids), threads):
             pass
-    return (result / np.float32(LESS_NOISE.grids)), np.sqrt(around / LESS_NOISE.grids).astype(np.float32)
+    return (result / np.float32(LESS_NOISE.grids)), np.sqrt(noise_square / LESS_NOISE.grids).astype(np.float32)
 
 
 def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Elements by cells, which go by place and by the way that they face, some whole cells at once.
+    """Elements by cells of position and of the direction that they face, some whole cells at once.
 
     Yields
     ------
-    own : (k,) int
-        Elements, in each cell rising.
+    elements : (k,) int
+        In each cell rising.
     group : (k,) int
         The cell of each, from 0 on.
     """
     key = np.zeros(len(position), np.int64)
 
-    def tell_apart(part: np.ndarray) -> None:
+    def append_to_key(digit: np.ndarray) -> None:
         nonlocal key
-        part = part.astype(np.int64)
-        part -= part.min(initial=0)
-        key *= int(part.max(initial=0)) + 1
-        key += part
+        digit = digit.astype(np.int64)
+        digit -= digit.min(initial=0)
+        key *= int(digit.max(initial=0)) + 1
+        key += digit
 
     # One axis after the other: all six at once were the most memory that a large room took.
-    for along in position.T:
-        tell_apart(np.floor(along / LESS_NOISE.cell + shift))
+    for coordinate in position.T:
+        append_to_key(np.floor(coordinate / LESS_NOISE.cell + shift))
     for facing in normal.T:
-        tell_apart(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
+        append_to_key(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
     order = np.argsort(key, kind="stable")
     key = key[order]
     new = np.append([True], key[1:] != key[:-1])[: len(key)]
@@ -102,14 +102,14 @@ def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: n
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(group, values, cells) / count
 
-    x = [(along - mean(along)[group]) / LESS_NOISE.cell for along in position.T]
-    second, both = np.empty((cells, 3, 3)), np.empty((cells, 3, 3))
+    x = [(coordinate - mean(coordinate)[group]) / LESS_NOISE.cell for coordinate in position.T]
+    second, moments = np.empty((cells, 3, 3)), np.empty((cells, 3, 3))
     for i in range(3):
         for j in range(3):
             second[:, i, j] = mean(x[i] * x[j]) if j >= i else second[:, j, i]
-            both[:, i, j] = mean(x[i] * light[:, j])
+            moments[:, i, j] = mean(x[i] * light[:, j])
     # Across a wall there is no slope to find.
-    slope = _solved(second + 1e-4 * np.eye(3), both)
+    slope = _solved(second + 1e-4 * np.eye(3), moments)
     fitted = np.empty_like(light)
     for c in range(3):
         fitted[:, c] = mean(light[:, c])[group] + sum(x[i] * slope[group, i, c] for i in range(3))

@@ -1,4 +1,4 @@
-"""The radiances under which albedo varies least within the objects, and the elements that can tell.
+"""The radiances under which albedo varies least within the objects, and the elements that show it.
 
 For trial radiances s_k the albedos would be pi L_d / (E + sum s_k G_k), G_k being the irradiance that light k throws at
 radiance 1. What is minimised is the mean deviation of log albedo from its object's median, each held at a cap.
@@ -75,8 +75,8 @@ class Sample:
         # The scale to search around: where the trial light gives as much as all known light together.
         grid = np.log(max(received.mean(), 1e-9) / contribution.mean()) + np.linspace(-5, 4, 37)
         costs = [cost(x) for x in grid]
-        at = int(np.argmin(costs))
-        if at == len(grid) - 1:
+        index = int(np.argmin(costs))
+        if index == len(grid) - 1:
             return None  # more is always better: this says nothing about the light
-        found = minimize_scalar(cost, bounds=(grid[max(at - 1, 0)], grid[at + 1]), method="bounded")
-        return float(np.exp(found.x)), self.spread_under(sent, received), float(found.fun)
+        minimum = minimize_scalar(cost, bounds=(grid[max(index - 1, 0)], grid[index + 1]), method="bounded")
+        return float(np.exp(minimum.x)), self.spread_under(sent, received), float(minimum.fun)

@@ -2,7 +2,7 @@
 
 Rays are drawn from a few lobes of different width (by visible normals, weights <= 1) and from the bright triangles; the
 balance heuristic over all of them makes the same rays serve any phi in between. Every observation is computed twice,
-with rays of its own each time: what the two differ by tells the noise of their mean, which the fit takes out.
+with rays of its own each time: their difference gives the noise of their mean, which the fit takes out.
 
 Rays aimed at the openings to the outside (`portals`) were tried as well: of the same number of rays the
 noise of A stayed as it was for broad lobes (0.43 to 0.40 of the radiance on the living room's floor, 0.13 to 0.14 on a
@@ -73,12 +73,12 @@ class LobeLight:
             Of the normal, summed over the axes, radians^2.
         """
         root = np.sqrt(self.grid)
-        asked = np.minimum((np.square(self.grid) + variance[:, None]) ** 0.25, root[-1])
-        low = np.clip(np.searchsorted(root, asked, "right") - 1, 0, len(root) - 2)
-        share = ((asked - root[low]) / np.diff(root)[low])[..., None].astype(np.float32)
+        phi_root = np.minimum((np.square(self.grid) + variance[:, None]) ** 0.25, root[-1])
+        low = np.clip(np.searchsorted(root, phi_root, "right") - 1, 0, len(root) - 2)
+        share = ((phi_root - root[low]) / np.diff(root)[low])[..., None].astype(np.float32)
 
         def between(values: np.ndarray) -> np.ndarray:
-            below, above = (np.take_along_axis(values, at[..., None], 1) for at in (low, low + 1))
+            below, above = (np.take_along_axis(values, index[..., None], 1) for index in (low, low + 1))
             return below + share * (above - below)
 
         A, B, A_noise, B_noise = (between(x) for x in (self.A, self.B, self.A_noise, self.B_noise))
@@ -122,51 +122,51 @@ def reflected_light(
         Whose lobes; rays are drawn from GGX's for any of them.
     """
     m, p = len(element), len(grid)
-    both = np.zeros((m, 2, p, 6), np.float32)
+    halves = np.zeros((m, 2, p, 6), np.float32)
     half = rays // 2
-    each = max(half // (len(proposals) + bool(len(bright))), 1)
+    per_proposal = max(half // (len(proposals) + bool(len(bright))), 1)
 
     def run(part: slice) -> None:
         rng = np.random.default_rng([seed, part.start])
-        at = np.repeat(element[part], 2)
-        n, wo = room.atlas.normal[at], np.repeat(direction[part], 2, 0)
+        elements = np.repeat(element[part], 2)
+        n, wo = room.atlas.normal[elements], np.repeat(direction[part], 2, 0)
         axes = np.stack([*tangent_frame(n), n]).transpose(0, 2, 1)[..., None]  # (3 axes, 3, m, 1): +Z is the normal
         local_wo = np.stack([_dot(axis, wo.T[..., None])[:, 0] for axis in axes])
         local_wo[2] = np.maximum(local_wo[2], 1e-4)
-        origin = room.scene.off_surface(room.atlas.position[at], n)
-        drawn, aims = [], []  # aims: the triangle that a ray must meet, or `ANY`
+        origin = room.scene.off_surface(room.atlas.position[elements], n)
+        directions, targets = [], []  # targets: the triangle that a ray must meet, or `ANY`
         for phi in proposals:
-            h = ggx.sample_visible_normal(local_wo, _stratified(len(at), each, rng), phi)
-            drawn.append(2 * _dot(h, local_wo[..., None]) * h - local_wo[..., None])
-            aims.append(np.full((len(at), each), ANY, np.int32))
+            h = ggx.sample_visible_normal(local_wo, _stratified(len(elements), per_proposal, rng), phi)
+            directions.append(2 * _dot(h, local_wo[..., None]) * h - local_wo[..., None])
+            targets.append(np.full((len(elements), per_proposal), ANY, np.int32))
         if len(bright):
-            cube = rng.random((len(at), each, 3), np.float32)
-            cube[..., 0] = (np.arange(each, dtype=np.float32) + cube[..., 0]) / each
+            cube = rng.random((len(elements), per_proposal, 3), np.float32)
+            cube[..., 0] = (np.arange(per_proposal, dtype=np.float32) + cube[..., 0]) / per_proposal
             pick = sample_bright(bright, cube)
-            way = pick.point.T.reshape(3, len(at), each) - origin.T[..., None]
-            way /= np.maximum(np.sqrt(_dot(way, way)), 1e-9)
-            drawn.append(np.stack([_dot(axis, way) for axis in axes]))
-            aims.append(pick.triangle.reshape(len(at), each))
-        w = np.concatenate(drawn, 2).astype(np.float32)
-        L, density = _arriving(room, bright, origin, w, axes, np.concatenate(aims, 1).ravel())
-        density *= each
+            aimed = pick.point.T.reshape(3, len(elements), per_proposal) - origin.T[..., None]
+            aimed /= np.maximum(np.sqrt(_dot(aimed, aimed)), 1e-9)
+            directions.append(np.stack([_dot(axis, aimed) for axis in axes]))
+            targets.append(pick.triangle.reshape(len(elements), per_proposal))
+        w = np.concatenate(directions, 2).astype(np.float32)
+        L, density = _arriving(room, bright, origin, w, axes, np.concatenate(targets, 1).ravel())
+        density *= per_proposal
 
         n_w, n_wo = np.maximum(w[2], 1e-4), local_wo[2][:, None]
-        along = _dot(w, local_wo[..., None])  # w.wo, from which |w + wo|, w.h and n.h follow
+        cosine = _dot(w, local_wo[..., None])  # w.wo, from which |w + wo|, w.h and n.h follow
         hx, hy = w[0] + local_wo[0][:, None], w[1] + local_wo[1][:, None]
-        sin2_h = np.minimum((hx * hx + hy * hy) / np.maximum(2 + 2 * along, 1e-9), 1)
-        s = rise(np.sqrt(np.clip((1 + along) / 2, 0, 1)))
+        sin2_h = np.minimum((hx * hx + hy * hy) / np.maximum(2 + 2 * cosine, 1e-9), 1)
+        s = rise(np.sqrt(np.clip((1 + cosine) / 2, 0, 1)))
         # G1(n.wo) D / 2 is the density of `ggx.visible_normal_density`
         for phi in proposals:
             a = np.float32(phi * phi)
             base = sin2_h + a * (1 - sin2_h)
-            density += each * a / (2 * np.float32(np.pi)) * G1(n_wo, phi) / (base * base)
+            density += per_proposal * a / (2 * np.float32(np.pi)) * G1(n_wo, phi) / (base * base)
         L *= (n_w / np.maximum(density, 1e-12))[..., None]
         weighted = np.concatenate([L * (1 - s)[..., None], L * s[..., None]], -1)
-        both[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
+        halves[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
 
     for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads)
-    mean, noise = both.mean(1), (both[:, 0] - both[:, 1]) / 2
+    mean, noise = halves.mean(1), (halves[:, 0] - halves[:, 1]) / 2
     return LobeLight(mean[..., :3], mean[..., 3:], noise[..., :3], noise[..., 3:], np.asarray(grid, np.float32))
 
 
@@ -199,7 +199,7 @@ def highlight(
     return np.asarray(f0, np.float32) * light.A[:, 0] + light.B[:, 0]
 
 
-def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarray]:
+def _arriving(room, bright, origin, w, axes, targets) -> tuple[np.ndarray, np.ndarray]:
     """Radiance along local directions w ((3, m, k)) and the density with which one is aimed: (m, k, 3), (m, k).
 
     A ray that something keeps from what it was aimed at gives nothing: what it meets is left to the other rays, whose
@@ -213,17 +213,17 @@ def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarr
         directions[:, j] = _dot(w, axes[:, j]).ravel().take(above)
     start = origin.take(above // k, 0)
     hits = room.scene.intersect(start, directions)
-    aims = aims.take(above)
-    met = (aims == ANY) | (aims == hits.triangle)
-    L[above] = room.arriving(hits, room.elements(hits), directions, origins=start) * met[:, None]
+    targets = targets.take(above)
+    counts = (targets == ANY) | (targets == hits.triangle)
+    L[above] = room.arriving(hits, room.elements(hits), directions, origins=start) * counts[:, None]
     if len(bright):
         density[above] = aimed_density(bright, hits, directions, room.normal)
     return L.reshape(m, k, 3), density.reshape(m, k)
 
 
-def _dot(planes: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Sum of products over the first axis, of three planes each: many times as fast as einsum along short rows."""
-    return planes[0] * others[0] + planes[1] * others[1] + planes[2] * others[2]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:

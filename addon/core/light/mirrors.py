@@ -1,7 +1,7 @@
 """Flat mirrors: light that reaches a surface over one.
 
 A mirror shows every point of the room something else; its L_d, one value an element, says nothing of what it throws on
-its surroundings. Rays that meet one go on in the mirrored direction (`field`), and bright triangles are aimed at
+its surroundings. Rays that meet one continue in the mirrored direction (`field`), and bright triangles are aimed at
 through it (`over_mirrors`). On the living room that took the albedo from 28.0 to 30.2 dB.
 """
 
@@ -43,14 +43,14 @@ class Mirror:
         return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
 
     @staticmethod
-    def from_lists(known: dict[str, Any]) -> Mirror:
+    def from_lists(entry: dict[str, Any]) -> Mirror:
         """What `as_lists` gave."""
-        point, normal, f0 = (np.asarray(known[name], np.float32) for name in ("point", "normal", "f0"))
-        return Mirror(known["object_id"], point, normal, f0)
+        point, normal, f0 = (np.asarray(entry[name], np.float32) for name in ("point", "normal", "f0"))
+        return Mirror(entry["object_id"], point, normal, f0)
 
 
 def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:
-    """The mirror that a capture tells of, its normal turned to its object's front."""
+    """The mirror that a capture names, its normal turned to its object's front."""
     normal, _ = mesh.geometry
     turn = -1.0 if (normal[mesh.object_id == known.object_id] @ known.normal).sum() < 0 else 1.0
     return Mirror(
@@ -70,7 +70,7 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
     """The mesh's vertices with those of mirrors put where the room that they show says that their planes lie.
 
     A renderer reflects at the mesh's own triangles, which a scan's noise turns by some tenths of a degree; what a
-    mirror shows moves by twice that. Which way it faces is told by what it shows (`passes.mirrors.flat_mirrors`), how
+    mirror shows moves by twice that. Its direction follows from what it shows (`passes.mirrors.flat_mirrors`), how
     far off it lies by its vertices. A mirror that is one side of a sheet (`Mesh.backs`) stays as it is.
 
     Returns
@@ -83,17 +83,17 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
     for mirror in mirrors:
         if mirror.object_id in sheets:
             continue
-        way = mirror.normal.astype(np.float64)
-        face = np.flatnonzero((mesh.object_id == mirror.object_id) & (np.abs(normal @ way) > SAME))
+        direction = mirror.normal.astype(np.float64)
+        face = np.flatnonzero((mesh.object_id == mirror.object_id) & (np.abs(normal @ direction) > SAME))
         if not len(face):
             continue
-        own, corner = np.unique(mesh.triangles[face], return_inverse=True)
-        first, place = same_place(vertices[own], one_place(vertices))
+        used, corner = np.unique(mesh.triangles[face], return_inverse=True)
+        first, place = same_place(vertices[used], one_place(vertices))
         corner = place[corner.reshape(-1, 3)]
         # Each connected part of it at the mean height of its area.
         _, part = connected_components(ring_of(corner, len(first)), directed=False)
-        height = vertices[own[first]] @ way
+        height = vertices[used[first]] @ direction
         weight = np.bincount(corner.ravel(), np.repeat(area[face], 3), len(first))
         level = np.bincount(part, weight * height) / np.bincount(part, weight)
-        vertices[own] += ((level[part] - height)[place])[:, None] * way
+        vertices[used] += ((level[part] - height)[place])[:, None] * direction
     return vertices

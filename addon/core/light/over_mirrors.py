@@ -37,38 +37,40 @@ def direct_over_mirrors(
         rng = np.random.default_rng([seed, mirror.object_id])
         front = np.flatnonzero((position - mirror.point) @ mirror.normal > field.scene.offset)
         for part in blocks(len(front), step):
-            at = front[part]
-            p, n = position[at], normal[at]
-            pick = sample_bright(bright, shifted(pattern, len(at), rng))
+            index = front[part]
+            p, n = position[index], normal[index]
+            pick = sample_bright(bright, shifted(pattern, len(index), rng))
             image = pick.point - 2 * ((pick.point - mirror.point) @ mirror.normal)[:, None] * mirror.normal
             origin = np.repeat(field.scene.off_surface(p, n), emitter_rays, 0)
-            way = image - origin
-            distance = np.sqrt(np.einsum("ij,ij->i", way, way))
-            direction = way / np.maximum(distance, 1e-12)[:, None]
+            to_image = image - origin
+            distance = np.sqrt(np.einsum("ij,ij->i", to_image, to_image))
+            direction = to_image / np.maximum(distance, 1e-12)[:, None]
             cosine = np.einsum("ij,ij->i", direction, np.repeat(n, emitter_rays, 0))
-            after = reflect(direction, mirror.normal)
-            facing = -np.einsum("ij,ij->i", after, bright.normal[pick.index])
+            reflected = reflect(direction, mirror.normal)
+            facing = -np.einsum("ij,ij->i", reflected, bright.normal[pick.index])
             useful = np.flatnonzero(
                 (cosine > 0)
                 & ((pick.point - mirror.point) @ mirror.normal > 0)
                 & ((facing > 1e-6) | ~field.one_sided[pick.triangle])
             )
             hits = field.scene.intersect(origin[useful], direction[useful])
-            met = (hits.triangle >= 0) & (field.mirror_of[hits.triangle] == field.mirrors.index(mirror))
-            useful, travelled = useful[met], hits.distance[met]
-            turn = origin[useful] + travelled[:, None] * direction[useful]
-            turn = field.scene.off_surface(turn, np.broadcast_to(mirror.normal, turn.shape))
+            on_mirror = (hits.triangle >= 0) & (field.mirror_of[hits.triangle] == field.mirrors.index(mirror))
+            useful, to_mirror = useful[on_mirror], hits.distance[on_mirror]
+            mirror_point = origin[useful] + to_mirror[:, None] * direction[useful]
+            mirror_point = field.scene.off_surface(mirror_point, np.broadcast_to(mirror.normal, mirror_point.shape))
             # To the point itself: where the mesh is a millimetre off the mirror's plane, the mirrored way would end
             # behind it as often as before it, and the lamp would be in its own shadow.
-            rest = pick.point[useful] - turn
-            left = np.sqrt(np.einsum("ij,ij->i", rest, rest))
+            to_lamp = pick.point[useful] - mirror_point
+            length = np.sqrt(np.einsum("ij,ij->i", to_lamp, to_lamp))
             hidden = field.scene.occluded(
-                turn, rest / np.maximum(left, 1e-12)[:, None], left * np.float32(1 - 1e-4) - field.scene.offset
+                mirror_point,
+                to_lamp / np.maximum(length, 1e-12)[:, None],
+                length * np.float32(1 - 1e-4) - field.scene.offset,
             )
             useful = useful[~hidden]
             element = field.lookup(pick.triangle[useful], pick.u[useful], pick.v[useful])
             weight = cosine[useful] * np.abs(facing[useful]) / (distance[useful] ** 2 * pick.density[useful])
             value = np.zeros((len(origin), 3), np.float32)
             value[useful] = mirror.f0 * field.radiance[element] * weight[:, None]
-            total[at] += value.reshape(len(at), emitter_rays, 3).sum(1) / emitter_rays
+            total[index] += value.reshape(len(index), emitter_rays, 3).sum(1) / emitter_rays
     return total

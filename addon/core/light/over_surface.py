@@ -1,4 +1,4 @@
-"""E over the surface: which estimator is asked at which elements, and what is interpolated between."""
+"""E over the surface: which estimator is evaluated at which elements, and what is interpolated between."""
 
 import functools
 from typing import TypedDict
@@ -98,12 +98,20 @@ def irradiance(
         steps["count"] += 1
 
         def run(part: slice) -> None:
-            at = element[index[part]]
-            here = seed + 7919 * steps["count"] + part.start
-            found = gather(
-                field, bright, atlas.position[at], atlas.normal[at], rays, lamp_rays, here, portals, portal_rays
+            elements = element[index[part]]
+            block_seed = seed + 7919 * steps["count"] + part.start
+            result = gather(
+                field,
+                bright,
+                atlas.position[elements],
+                atlas.normal[elements],
+                rays,
+                lamp_rays,
+                block_seed,
+                portals,
+                portal_rays,
             )
-            value[part, :3], radius[part], value[part, 3] = found
+            value[part, :3], radius[part], value[part, 3] = result
 
         for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, gathering)
         gathering.next()
@@ -119,48 +127,50 @@ def irradiance(
         if not interpolate:
             points += len(index)
             return np.concatenate([gathered(index)[0], np.zeros((len(index), 1), np.float32)], 1)
-        at = atlas.position[element[index]], atlas.normal[element[index]]
-        value, chosen, contrast = interpolated(*at, lambda i: gathered(index[i]), finest, threads)
+        surface_points = atlas.position[element[index]], atlas.normal[element[index]]
+        value, chosen, contrast = interpolated(*surface_points, lambda i: gathered(index[i]), finest, threads)
         points += len(chosen)
         return np.concatenate([value, contrast[:, None]], 1)
 
     def aim(index: np.ndarray) -> np.ndarray:
         """The lamps' part of E, and its noise, (k, 4) float32."""
-        found = np.empty((len(index), 4), np.float32)
+        result = np.empty((len(index), 4), np.float32)
 
         def run(part: slice) -> None:
-            at = element[index[part]]
-            found[part, :3], found[part, 3] = direct(
-                field, bright, atlas.position[at], atlas.normal[at], rays, lamp_rays, seed + 1 + part.start
+            elements = element[index[part]]
+            result[part, :3], result[part, 3] = direct(
+                field, bright, atlas.position[elements], atlas.normal[elements], rays, lamp_rays, seed + 1 + part.start
             )
 
         for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads, aiming)
         aiming.next()
-        return found
+        return result
 
     def shine(sun: Sun, index: np.ndarray) -> np.ndarray:
         """The sun's part of E and its error, (k, 4) float32."""
-        found, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
+        result, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
 
         def run(part: slice) -> None:
-            at = element[index[part]]
-            found[part] = sunlight(field.scene, sun, atlas.position[at], atlas.normal[at], edge, seed + 2 + part.start)
+            elements = element[index[part]]
+            result[part] = sunlight(
+                field.scene, sun, atlas.position[elements], atlas.normal[elements], edge, seed + 2 + part.start
+            )
 
         for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
-        return found
+        return result
 
     value = blocks.evaluate(around, step, np.inf)
     total, escaped = value[:, :3].copy(), value[:, 3].copy()
-    unsure = value[:, 4] * total.mean(1)
+    error = value[:, 4] * total.mean(1)
     del value
     if lamp_rays:
         lamps = blocks.evaluate(aim, step, GATHER.smooth, total.mean(1))
         total += lamps[:, :3]
-        unsure = np.hypot(unsure, lamps[:, 3])
+        error = np.hypot(error, lamps[:, 3])
     if smooth:
-        total, unsure = less_noise(atlas.position[element], atlas.normal[element], total, unsure, threads=threads)
+        total, error = less_noise(atlas.position[element], atlas.normal[element], total, error, threads=threads)
     if field.sun is not None:
-        shone = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
-        total += shone[:, :3]
-        unsure = np.hypot(unsure, shone[:, 3])
-    return total, escaped, points, unsure / np.maximum(total.mean(1), 1e-20)
+        sunlit = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
+        total += sunlit[:, :3]
+        error = np.hypot(error, sunlit[:, 3])
+    return total, escaped, points, error / np.maximum(total.mean(1), 1e-20)

@@ -1,7 +1,7 @@
 """Portals: the openings that light from outside comes in by, as cells on the room's bounding box to aim rays at.
 
 A window fills a small part of the hemisphere; cosine-distributed rays find it by chance. Where rays that left the mesh
-crossed the bounding box tells where the openings are, without any knowledge of what a window is.
+crossed the bounding box shows where the openings are, without any knowledge of what a window is.
 """
 
 from dataclasses import dataclass
@@ -78,15 +78,15 @@ class Portals:
         flat = square.reshape(-1, 2)
         axis = side // 2
         first, second = (axis + 1) % 3, (axis + 2) % 3
-        at = np.arange(len(pick))
+        index = np.arange(len(pick))
         point = np.empty((len(pick), 3), np.float32)
-        point[at, axis] = side % 2
-        point[at, first] = (row + flat[:, 0]) / GATHER.cells
-        point[at, second] = (column + flat[:, 1]) / GATHER.cells
-        way = self.low + point * self.size - np.repeat(origins, k, 0)
-        distance = np.sqrt(np.einsum("ij,ij->i", way, way))
-        directions = way / np.maximum(distance, 1e-12)[:, None]
-        cosine = np.abs(directions[at, axis])
+        point[index, axis] = side % 2
+        point[index, first] = (row + flat[:, 0]) / GATHER.cells
+        point[index, second] = (column + flat[:, 1]) / GATHER.cells
+        offset = self.low + point * self.size - np.repeat(origins, k, 0)
+        distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
+        directions = offset / np.maximum(distance, 1e-12)[:, None]
+        cosine = np.abs(directions[index, axis])
         return directions, self.density[pick] * distance**2 / np.maximum(cosine, 1e-6)
 
 
@@ -103,17 +103,17 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     origins, directions = field.leaving[seed]
     light = field.outside(origins, directions) @ LUMINANCE
     low, size = field.outer_box
-    telling = np.flatnonzero((light > 0) & within(low, size, origins))
-    if len(telling) < LEVELS.few:
+    bright = np.flatnonzero((light > 0) & within(low, size, origins))
+    if len(bright) < LEVELS.few:
         return None
-    light = light[telling]
-    cell, _, _ = exits(low, size, origins[telling], directions[telling])
+    light = light[bright]
+    cell, _, _ = exits(low, size, origins[bright], directions[bright])
     chance = np.bincount(cell, light.astype(np.float64), CELLS)
     side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
     area = (size[(side + 1) % 3] * size[(side + 2) % 3] / GATHER.cells**2).astype(np.float32)
-    found = np.flatnonzero(chance > 0)
+    cells = np.flatnonzero(chance > 0)
     chance = chance / chance.sum()
-    return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))
+    return Portals(low, size, cells, chance[cells], (chance / area).astype(np.float32))
 
 
 def _leaving(field: LightField, seed: int) -> tuple[np.ndarray, np.ndarray]:

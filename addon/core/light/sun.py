@@ -1,8 +1,8 @@
 """The sun: light from one small disc of the sky, whose shadows are followed exactly.
 
-In a map of the sky it fills a texel or two, which rays find by chance; so it is kept apart from the map (`taken_out`),
+In a map of the sky it fills a texel or two, which rays find by chance; so it is taken from the map (`extract_sun`),
 its part of E comes from shadow rays at every place (`sunlight`), and it goes back into the map that is written
-(`put_in`). One that no frame saw is solved for (`sun_fit`).
+(`insert_sun`). One that no frame saw is solved for (`sun_fit`).
 """
 
 from dataclasses import dataclass, replace
@@ -19,9 +19,9 @@ from .params import SKY
 RADIUS = float(np.radians(0.27))
 """Of the sun's disc, as it is seen from the earth."""
 EDGE = float(np.radians(0.3))
-"""A shadow's edge is told no better than this: the direction that was solved for, the poses, the mesh."""
+"""A shadow's edge is known no better than this: the direction that was solved for, the poses, the mesh."""
 WIDE, RING = float(np.radians(2.5)), float(np.radians(7.0))
-"""It and its glare fit into a disc of the first radius; what lies on to the second is the sky around it."""
+"""It and its glare fit into a disc of the first radius; from there to the second is the sky around it."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Sun:
 
 def around(direction: np.ndarray, disc: np.ndarray) -> np.ndarray:
     """Unit directions at offsets `disc` ((..., 2), radians) from one, (..., 3) float32."""
-    across, up = tangent_frame(np.asarray(direction, np.float32)[None])
-    turned = direction + disc[..., :1] * across[0] + disc[..., 1:] * up[0]
-    return (turned / np.linalg.norm(turned, axis=-1, keepdims=True)).astype(np.float32)
+    right, up = tangent_frame(np.asarray(direction, np.float32)[None])
+    directions = direction + disc[..., :1] * right[0] + disc[..., 1:] * up[0]
+    return (directions / np.linalg.norm(directions, axis=-1, keepdims=True)).astype(np.float32)
 
 
 def _disc(square: np.ndarray, radius: float) -> np.ndarray:
@@ -82,7 +82,7 @@ def shadow(
     -------
     contribution : (n,) float32
         E at an irradiance of 1: the visible share times the cosine.
-    unsure : (n,) float32
+    error : (n,) float32
         Its standard error at a shadow's edge.
     """
     cosine = np.maximum(normal @ np.asarray(sun.direction, np.float32), 0)
@@ -92,13 +92,13 @@ def shadow(
         count = len(facing)
         rng = np.random.default_rng([seed, 2])
         points = shifted(sobol(SKY.shadow_rays, seed, 4), min(64, count), rng)[rng.integers(0, min(64, count), count)]
-        way = around(sun.direction, _disc(points[..., :2], float(np.hypot(sun.radius, EDGE))))
-        across, up = tangent_frame(normal[facing])
-        off = np.float32(edge) * (points[..., 2:] - np.float32(0.5))
+        directions = around(sun.direction, _disc(points[..., :2], float(np.hypot(sun.radius, EDGE))))
+        right, up = tangent_frame(normal[facing])
+        offset = np.float32(edge) * (points[..., 2:] - np.float32(0.5))
         start = scene.off_surface(position[facing], normal[facing])[:, None]
-        start = start + off[..., :1] * across[:, None] + off[..., 1:] * up[:, None]
-        far = np.full(count * SKY.shadow_rays, np.inf, np.float32)
-        hidden = scene.occluded(start.reshape(-1, 3), way.reshape(-1, 3), far)
+        start = start + offset[..., :1] * right[:, None] + offset[..., 1:] * up[:, None]
+        reach = np.full(count * SKY.shadow_rays, np.inf, np.float32)
+        hidden = scene.occluded(start.reshape(-1, 3), directions.reshape(-1, 3), reach)
         visible[facing] = 1 - hidden.reshape(count, SKY.shadow_rays).mean(1)
     return cosine * visible, cosine * np.sqrt(visible * (1 - visible))
 
@@ -107,22 +107,24 @@ def sunlight(
     scene: RayScene, sun: Sun, position: np.ndarray, normal: np.ndarray, edge: float, seed: int = 0
 ) -> np.ndarray:
     """The sun's part of E in three channels, and the luminance of its error, (n, 4) float32; see `shadow`."""
-    contribution, unsure = shadow(scene, sun, position, normal, edge, seed)
+    contribution, error = shadow(scene, sun, position, normal, edge, seed)
     light = np.float32(sun.irradiance)
-    return np.concatenate([contribution[:, None] * light, (unsure * light.mean())[:, None]], 1).astype(np.float32)
+    return np.concatenate([contribution[:, None] * light, (error * light.mean())[:, None]], 1).astype(np.float32)
 
 
 def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:
     """Direction ((h, 2h, 3)) and solid angle ((h, 1)) of a map's texels."""
     latitude = (np.arange(height) + 0.5) / height * np.pi - np.pi / 2
     longitude = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    flat = np.cos(latitude)[:, None]
-    way = np.stack([flat * np.cos(longitude), flat * np.sin(longitude), np.sin(latitude)[:, None] + 0 * longitude], -1)
+    cosine = np.cos(latitude)[:, None]
+    directions = np.stack(
+        [cosine * np.cos(longitude), cosine * np.sin(longitude), np.sin(latitude)[:, None] + 0 * longitude], -1
+    )
     edges = np.sin(np.arange(height + 1) / height * np.pi - np.pi / 2)
-    return way.astype(np.float32), (np.diff(edges) * np.pi / height)[:, None]
+    return directions.astype(np.float32), (np.diff(edges) * np.pi / height)[:, None]
 
 
-def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
+def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
     """The map without the sun that frames saw in it, and that sun.
 
     It is what lies within `WIDE` of the middle of the brightest seen texels, if it is more than `above` times over the
@@ -133,35 +135,36 @@ def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
     seen = environment.told
     if not seen.any():
         return environment, None
-    way, solid = _directions(len(luminance))
-    wide = max(WIDE, 1.5 * np.pi / len(luminance))  # its own texel and those around it, where they are coarse
+    directions, solid_angle = _directions(len(luminance))
+    radius = max(WIDE, 1.5 * np.pi / len(luminance))  # its own texel and those around it, where they are coarse
     peak = np.unravel_index(np.where(seen, luminance, -1).argmax(), luminance.shape)
-    disc = (way @ way[peak] > np.cos(2 * wide)) & (luminance > luminance[peak] / 4)
-    middle = (way * (solid * disc)[..., None]).sum((0, 1))
-    angle = np.arccos(np.clip(way @ (middle / np.linalg.norm(middle)), -1, 1))
-    near = angle <= wide
+    disc = (directions @ directions[peak] > np.cos(2 * radius)) & (luminance > luminance[peak] / 4)
+    middle = (directions * (solid_angle * disc)[..., None]).sum((0, 1))
+    angle = np.arccos(np.clip(directions @ (middle / np.linalg.norm(middle)), -1, 1))
+    near = angle <= radius
     ring = seen & ~near & (angle < RING)
-    beside = ring if ring.any() else seen & ~near
-    if not beside.any():
+    surroundings = ring if ring.any() else seen & ~near
+    if not surroundings.any():
         return environment, None
-    sky = np.median(environment.radiance[beside], 0)
+    sky = np.median(environment.radiance[surroundings], 0)
     level = SKY.above * max(float(sky @ LUMINANCE), 1e-12)
     bright = (luminance > level) & (environment.observations > 0)
     if not bright[near & seen].any() or (bright & ~near).any() or (bright & environment.clipped).any():
         return environment, None
-    own = near & (luminance > 2 * float(sky @ LUMINANCE))
-    flux = ((environment.radiance - sky) * solid[..., None])[own].sum(0)
-    whole = float((luminance * solid).sum() / 4)  # a quarter: the mean over all ways that a surface may face
-    if float(flux @ LUMINANCE) / 4 < SKY.least_share * whole:
+    sun_texels = near & (luminance > 2 * float(sky @ LUMINANCE))
+    flux = ((environment.radiance - sky) * solid_angle[..., None])[sun_texels].sum(0)
+    # A quarter: the mean over all directions that a surface may face.
+    mean_irradiance = float((luminance * solid_angle).sum() / 4)
+    if float(flux @ LUMINANCE) / 4 < SKY.least_share * mean_irradiance:
         return environment, None
-    middle = (way * (luminance * solid * own)[..., None]).sum((0, 1))
+    middle = (directions * (luminance * solid_angle * sun_texels)[..., None]).sum((0, 1))
     direction = (middle / np.linalg.norm(middle)).astype(np.float32)
-    dark = np.where(own[..., None], np.float32(sky), environment.radiance).astype(np.float32)
+    dark = np.where(sun_texels[..., None], np.float32(sky), environment.radiance).astype(np.float32)
     sun = Sun(direction, np.maximum(flux, 0).astype(np.float32), RADIUS, True)
     return environment.refilled(dark), replace(sun, note=f"The frames see the sun: {sun.where()}.")
 
 
-def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
+def insert_sun(environment: Environment, sun: Sun | None) -> np.ndarray:
     """Radiance of the map with the sun in it, (h, 2h, 3) float32; of at least `written_rows` where there is one.
 
     Points of its disc are shared out bilinearly between texel centres: who looks the map up bilinearly sees the sun at
@@ -172,15 +175,15 @@ def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
     times = max(-(-SKY.max_height // len(environment.radiance)), 1)
     radiance = environment.radiance.repeat(times, 0).repeat(times, 1).astype(np.float64)
     height, width = radiance.shape[:2]
-    way = around(sun.direction, _disc(sobol(256, 0), sun.radius)).astype(np.float64)
-    column = (0.5 - np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi)) * width - 0.5
-    row = np.clip((0.5 + np.arcsin(np.clip(way[:, 2], -1, 1)) / np.pi) * height - 0.5, 0, height - 1)
+    directions = around(sun.direction, _disc(sobol(256, 0), sun.radius)).astype(np.float64)
+    column = (0.5 - np.arctan2(directions[:, 1], directions[:, 0]) / (2 * np.pi)) * width - 0.5
+    row = np.clip((0.5 + np.arcsin(np.clip(directions[:, 2], -1, 1)) / np.pi) * height - 0.5, 0, height - 1)
     left, low = np.floor(column), np.minimum(np.floor(row), height - 2)
     _, solid = _directions(height)
     for a in (0, 1):
         for b in (0, 1):
-            share = np.abs(1 - a - (row - low)) * np.abs(1 - b - (column - left)) / len(way)
-            at = (low + a).astype(int), (left + b).astype(int) % width
+            share = np.abs(1 - a - (row - low)) * np.abs(1 - b - (column - left)) / len(directions)
+            texel = (low + a).astype(int), (left + b).astype(int) % width
             for c in range(3):
-                np.add.at(radiance[..., c], at, share * sun.irradiance[c] / solid[at[0], 0])
+                np.add.at(radiance[..., c], texel, share * sun.irradiance[c] / solid[texel[0], 0])
     return radiance.astype(np.float32)

@@ -43,22 +43,22 @@ class TexelBlocks:
         index, low, left, row, column = index[fits], low[fits], left[fits], row[fits], column[fits]
         first = low * self._size + left
         corner = np.stack([self._at[first + a * self._size + b] for a in (0, step) for b in (0, step)], 1)
-        whole = np.flatnonzero((corner >= 0).all(1))
-        index, corner = index[whole], corner[whole]
-        v = ((row - low)[whole] / np.float32(step)).astype(np.float32)
-        u = ((column - left)[whole] / np.float32(step)).astype(np.float32)
+        complete = np.flatnonzero((corner >= 0).all(1))
+        index, corner = index[complete], corner[complete]
+        v = ((row - low)[complete] / np.float32(step)).astype(np.float32)
+        u = ((column - left)[complete] / np.float32(step)).astype(np.float32)
         weight = np.stack([(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u], 1)
         normal, position, element = self._atlas.normal, self._atlas.position, self._element
-        alike = np.einsum("kcj,kj->kc", normal[element[corner]], normal[element[index]]).min(1) >= BENT
-        index, corner, weight = index[alike], corner[alike], weight[alike]
-        place = position[element[corner]]
-        across = place[:, 3] - place[:, 0]
-        edge = np.sqrt(np.einsum("kj,kj->k", across, across) / 2)
-        off = np.einsum("kc,kcj->kj", weight, place) - position[element[index]]
-        right = (np.einsum("kj,kj->k", off, off) <= (GATHER.off_place * edge) ** 2) & (
+        coplanar = np.einsum("kcj,kj->kc", normal[element[corner]], normal[element[index]]).min(1) >= BENT
+        index, corner, weight = index[coplanar], corner[coplanar], weight[coplanar]
+        corners = position[element[corner]]
+        diagonal = corners[:, 3] - corners[:, 0]
+        edge = np.sqrt(np.einsum("kj,kj->k", diagonal, diagonal) / 2)
+        offset = np.einsum("kc,kcj->kj", weight, corners) - position[element[index]]
+        on_surface = (np.einsum("kj,kj->k", offset, offset) <= (GATHER.off_place * edge) ** 2) & (
             edge <= GATHER.stretch * step * self._atlas.texel_edge
         )
-        return index[right], corner[right], weight[right]
+        return index[on_surface], corner[on_surface], weight[on_surface]
 
     def evaluate(
         self, function: Callable[[np.ndarray], np.ndarray], step: int, tolerance: float, base: np.ndarray | None = None
@@ -85,25 +85,25 @@ class TexelBlocks:
         base = np.zeros(count, np.float32) if base is None else base
         value = None
         known = np.zeros(count, bool)
-        todo = np.arange(count, dtype=np.int32)
-        while len(todo):
+        remaining = np.arange(count, dtype=np.int32)
+        while len(remaining):
             wanted = np.zeros(count, bool)
             served: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
             if step >= 2:
 
-                def mark(part: slice, step=step, todo=todo, wanted=wanted, served=served) -> None:
-                    served[part.start] = self._served(todo[part], step)
+                def mark(part: slice, step=step, remaining=remaining, wanted=wanted, served=served) -> None:
+                    served[part.start] = self._served(remaining[part], step)
                     wanted[served[part.start][1]] = True
 
-                for_blocks(mark, len(todo), BLOCK, self._threads)
+                for_blocks(mark, len(remaining), BLOCK, self._threads)
             else:
-                wanted[todo] = True
+                wanted[remaining] = True
             new = np.flatnonzero(wanted & ~known)
             if len(new):
-                found = function(new)
+                values = function(new)
                 if value is None:
-                    value = np.zeros((count, found.shape[1]), np.float32)
-                value[new], known[new] = found, True
+                    value = np.zeros((count, values.shape[1]), np.float32)
+                value[new], known[new] = values, True
             if step < 2:
                 break
             done = known.copy()
@@ -113,14 +113,16 @@ class TexelBlocks:
                 near = value[corner]
                 level = near[..., :3].mean(2)
                 mean = level.mean(1)
-                apart = np.abs(level - mean[:, None]).max(1)
-                flat = np.full(len(index), True) if np.isinf(tolerance) else apart <= tolerance * (mean + base[index])
+                deviation = np.abs(level - mean[:, None]).max(1)
+                flat = (
+                    np.full(len(index), True) if np.isinf(tolerance) else deviation <= tolerance * (mean + base[index])
+                )
                 # Corners are known themselves; writing their own value again changes nothing.
                 value[index[flat]] = np.einsum("kc,kcv->kv", weight[flat], near[flat])
                 done[index[flat]] = True
 
             if value is not None:
-                for_blocks(spread, len(todo), BLOCK, self._threads)
-            todo = todo[~done[todo]]
+                for_blocks(spread, len(remaining), BLOCK, self._threads)
+            remaining = remaining[~done[remaining]]
             step //= 2
         return np.zeros((count, 3), np.float32) if value is None else value

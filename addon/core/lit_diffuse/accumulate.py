@@ -32,13 +32,13 @@ def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
 
     def take(kind: int) -> np.ndarray:
         """Put what is to be taken of another tier into `best`; gives that tier's counts."""
-        other = summary(kind)
-        beaten = (clean < VISIBILITY.enough) & (other.count >= clean) if kind == EDGE else tier < 0
-        chosen = beaten & (other.count > 0)
+        summary_of_tier = summary(kind)
+        beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean) if kind == EDGE else tier < 0
+        chosen = beaten & (summary_of_tier.count > 0)
         tier[chosen] = kind
         for name in ("median", "lower", "upper", "count"):
-            getattr(best, name)[chosen] = getattr(other, name)[chosen]
-        return other.count
+            getattr(best, name)[chosen] = getattr(summary_of_tier, name)[chosen]
+        return summary_of_tier.count
 
     edge, saturated = take(EDGE), take(SATURATED)
     clipped = saturated / np.maximum(clean + edge + saturated, 1)
@@ -96,31 +96,31 @@ def accumulate(
     """
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
-    wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
+    order, frame_bytes = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
 
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene)
         pixels = pixels if change is None else change(frame, view, pixels)
-        known = groups.seen(frame.camera, pixels.valid)
-        asked = groups.candidates(view) if known is None else known
-        asked = asked if only is None else asked[only[asked]]
-        found = observe(view, pixels, atlas, scene, asked, free=known is not None)
-        if known is None and only is None and change is None:
-            groups.remember(frame.camera, pixels.valid, found.element)
-        return int(index), view, pixels, found
+        remembered = groups.seen(frame.camera, pixels.valid)
+        elements = groups.candidates(view) if remembered is None else remembered
+        elements = elements if only is None else elements[only[elements]]
+        observations = observe(view, pixels, atlas, scene, elements, free=remembered is not None)
+        if remembered is None and only is None and change is None:
+            groups.remember(frame.camera, pixels.valid, observations.element)
+        return int(index), view, pixels, observations
 
     with ExitStack() as stack:
         for estimator in estimators.values():
             stack.callback(estimator.close)
-        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads, each=each)):
-            tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
+        for done, (index, view, pixels, observations) in enumerate(ordered_map(look, order, threads, each=frame_bytes)):
+            tiers = observations.tier if edge_tier else np.where(observations.tier == EDGE, CLEAN, observations.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)
-                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
+                estimator.add(observations.element.take(chosen), observations.radiance.take(chosen, 0))
             if also is not None:
-                also(index, view, pixels, seen)
+                also(index, view, pixels, observations)
             if progress is not None:
-                progress.update(0.9 * (done + 1) / len(wanted))
+                progress.update(0.9 * (done + 1) / len(order))
         return _choose(lambda tier: estimators[tier].result())

@@ -74,24 +74,24 @@ class Exact:
         quartiles = np.full((size, 3, len(QUARTILES)), np.nan, np.float32)
         # Elements with equally many observations make one array, whose rows are sorted at once.
         by_count = np.argsort(count, kind="stable")
-        for seen in np.unique(count[count > 0]):
-            low, high = np.searchsorted(count, (seen, seen + 1), sorter=by_count)
-            alike = by_count[low:high]
-            rows = value[start[alike, None] + np.arange(seen)].transpose(2, 0, 1).copy()
+        for observations in np.unique(count[count > 0]):
+            low, high = np.searchsorted(count, (observations, observations + 1), sorter=by_count)
+            same_count = by_count[low:high]
+            rows = value[start[same_count, None] + np.arange(observations)].transpose(2, 0, 1).copy()
             rows.sort(axis=-1)
-            for which, share in enumerate(QUARTILES):
-                quartiles[alike, :, which] = between(rows, share * (seen - 1)).T
+            for quartile, share in enumerate(QUARTILES):
+                quartiles[same_count, :, quartile] = between(rows, share * (observations - 1)).T
         return quartiles, count
 
     def result(self) -> Summary:
         lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
         count = np.empty(self._count, np.int32)
         sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
-        each = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
-        found = ordered_map(self._summarise, range(self._buckets), self._threads, each=each)
-        for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), found, strict=True):
+        bucket_bytes = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
+        summaries = ordered_map(self._summarise, range(self._buckets), self._threads, each=bucket_bytes)
+        for part, (quartiles, counts) in zip(blocks(self._count, self.BUCKET), summaries, strict=True):
             lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)
-            count[part] = seen
+            count[part] = counts
         self.close()
         return Summary(median, lower, upper, count)
 

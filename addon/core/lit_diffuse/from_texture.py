@@ -47,26 +47,26 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     BadInputError
         Nothing is stored, or no light; or a texture was changed or taken away since it was read.
     """
-    lit, n = mesh.lit, len(atlas)
-    if not isinstance(lit, LitTiles):
+    stored, n = mesh.lit, len(atlas)
+    if not isinstance(stored, LitTiles):
         raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
-    of_triangle, area = _tiles(mesh, lit)
+    of_triangle, area = _tiles(mesh, stored)
     key = of_triangle[atlas.triangle]
     order = np.argsort(key, kind="stable")
-    place = _place(mesh, lit, atlas)
+    place = _place(mesh, stored, atlas)
     # How many texels of its tile an element covers along an edge.
-    width = np.sqrt(atlas.area / np.maximum(area[key], 1e-30)) * lit.size
+    width = np.sqrt(atlas.area / np.maximum(area[key], 1e-30)) * stored.size
     sums = np.zeros((n, 5))
     tiles, first = np.unique(key[order], return_index=True)
     ends = np.append(first[1:], n)
     picture = np.zeros(len(area), np.int32)
     number = np.zeros(len(area), np.int64)
-    picture[of_triangle], number[of_triangle] = lit.picture, lit.tile
-    for part in _runs(picture[tiles], max(TEXELS_AT_ONCE // lit.size**2, 1)):
-        texels = _read(lit, int(picture[tiles[part.start]]), number[tiles[part]])
-        own = order[first[part.start] : ends[part.stop - 1]]
-        local = np.searchsorted(tiles[part], key[own])
-        sums[own] = _window_sums(texels, local, place[own] * lit.size, width[own], lit.size)
+    picture[of_triangle], number[of_triangle] = stored.picture, stored.tile
+    for part in _runs(picture[tiles], max(TEXELS_AT_ONCE // stored.size**2, 1)):
+        texels = _read(stored, int(picture[tiles[part.start]]), number[tiles[part]])
+        elements = order[first[part.start] : ends[part.stop - 1]]
+        local = np.searchsorted(tiles[part], key[elements])
+        sums[elements] = _window_sums(texels, local, place[elements] * stored.size, width[elements], stored.size)
         if progress is not None:
             progress.update(0.9 * part.stop / len(tiles))
     if not sums[:, 3].any():
@@ -86,19 +86,19 @@ def of_sums(sums: np.ndarray) -> LitDiffuse:
     return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
 
 
-def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:
+def _tiles(mesh: Mesh, stored: LitTiles) -> tuple[np.ndarray, np.ndarray]:
     """A number for each triangle's tile, (t,), and the surface that each tile covers, square metres."""
     _, area = mesh.geometry
-    of_triangle = np.unique(lit.picture.astype(np.int64) * (1 << 32) + lit.tile, return_inverse=True)[1].ravel()
+    of_triangle = np.unique(stored.picture.astype(np.int64) * (1 << 32) + stored.tile, return_inverse=True)[1].ravel()
     return of_triangle, np.bincount(of_triangle, area)
 
 
-def _place(mesh: Mesh, lit: LitTiles, atlas: Atlas) -> np.ndarray:
+def _place(mesh: Mesh, stored: LitTiles, atlas: Atlas) -> np.ndarray:
     """Where in its tile each element lies, (n, 2) float64, 0...1."""
     result = np.empty((len(atlas), 2))
     for part in blocks(len(atlas), 1 << 18):
         triangle = atlas.triangle[part]
-        result[part] = interpolated(lit.uv[triangle], *barycentric(mesh, triangle, atlas.position[part]))
+        result[part] = interpolated(stored.uv[triangle], *barycentric(mesh, triangle, atlas.position[part]))
     return np.clip(np.nan_to_num(result), 0, 1)
 
 
@@ -117,26 +117,26 @@ def interpolated(corner: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray
     return (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
 
 
-def _runs(picture: np.ndarray, most: int) -> list[slice]:
+def _runs(picture: np.ndarray, maximum: int) -> list[slice]:
     """Slices of at most so many tiles, each within one picture."""
     ends = [*(np.flatnonzero(np.diff(picture)) + 1).tolist(), len(picture)]
     return [
         slice(first + part.start, first + part.stop)
         for first, end in pairwise([0, *ends])
-        for part in blocks(end - first, most)
+        for part in blocks(end - first, maximum)
     ]
 
 
-def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
+def _read(light: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
     """Tiles of a picture, (k, size, size, 3) float32."""
-    path, side, size = lit.paths[picture], lit.side[picture], lit.size
+    path, side, size = light.paths[picture], light.side[picture], light.size
     try:
         stored = np.memmap(path, "<f2", "r", shape=(side, side, 3))
     except (OSError, ValueError) as error:
         raise BadInputError(f"Texture '{path}' changed during the run; start again.") from error
     across = side // size
-    whole = stored[: across * size, : across * size].reshape(across, size, across, size, 3)
-    return whole[number // across, :, number % across].astype(np.float32)
+    tiles = stored[: across * size, : across * size].reshape(across, size, across, size, 3)
+    return tiles[number // across, :, number % across].astype(np.float32)
 
 
 def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width: np.ndarray, size: int) -> np.ndarray:
@@ -145,13 +145,13 @@ def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width
     Their `centre` ((n, 2) x and y) and `width` ((n,)) are in texels; they are moved to lie within the tile ((n,) int).
     """
     known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
-    over = np.isposinf(texels).any(-1)
-    known |= over
+    infinite = np.isposinf(texels).any(-1)
+    known |= infinite
     values = np.concatenate(
         [
             np.where(known[..., None], np.minimum(texels, HALF_MAX), 0),
             known[..., None],
-            (known & (over | (texels >= HALF_MAX).any(-1)))[..., None],
+            (known & (infinite | (texels >= HALF_MAX).any(-1)))[..., None],
         ],
         -1,
         dtype=np.float64,

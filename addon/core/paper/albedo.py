@@ -19,5 +19,7 @@ def albedo(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> np.ndarray:
         Linear Rec.709, as it comes: above 1 where light is missing from S, and on lamps. NaN where no frame saw the
         element, or no light reaches it.
     """
-    lit = irradiance > 0
-    return np.where(lit, np.float32(np.pi) * lit_diffuse / np.where(lit, irradiance, 1), np.float32(np.nan))
+    receives_light = irradiance > 0
+    return np.where(
+        receives_light, np.float32(np.pi) * lit_diffuse / np.where(receives_light, irradiance, 1), np.float32(np.nan)
+    )

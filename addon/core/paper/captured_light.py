@@ -1,4 +1,4 @@
-"""L(x, w), the light that arrives at x from w (Haefner et al. 2021, sec. 3.2): where the ray hits, L_d is sent back.
+"""L(x, w), the light that arrives at x from w (Haefner et al. 2021, sec. 3.2): where the ray hits, it is L_d.
 
 So no lamp need be known, and one ray stands for all bounces: what the frames saw of a surface holds them already.
 """
@@ -55,11 +55,11 @@ class CapturedLight:
         """L(x, w) along rays ((n, 3) float32 each), distances in metres, and elements; -1 where a ray leaves."""
         hits = self.scene.intersect(origins, directions)
         element = np.full(len(origins), -1, np.int32)
-        met = np.flatnonzero(hits.triangle >= 0)
-        element[met] = self._element_at(hits.triangle[met], hits.u[met], hits.v[met])
+        hit = np.flatnonzero(hits.triangle >= 0)
+        element[hit] = self._element_at(hits.triangle[hit], hits.u[hit], hits.v[hit])
         radiance = np.zeros((len(origins), 3), np.float32)
-        radiance[met] = self.radiance[element[met]]
-        left = np.flatnonzero(element < 0)
-        if self.outside is not None and len(left):
-            radiance[left] = self.outside(directions[left])
+        radiance[hit] = self.radiance[element[hit]]
+        escaped = np.flatnonzero(element < 0)
+        if self.outside is not None and len(escaped):
+            radiance[escaped] = self.outside(directions[escaped])
         return radiance, hits.distance, element

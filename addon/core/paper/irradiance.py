@@ -80,9 +80,9 @@ def irradiance(
 
     def run(part: slice) -> None:
         rng = np.random.default_rng([seed, part.start])
-        L, w, out = arriving(light, position[part], normal[part], rays, rng)
+        L, w, left_mesh = arriving(light, position[part], normal[part], rays, rng)
         S[part] = np.float32(2 * np.pi / rays) * np.einsum("mkc,mk->mc", L, w[..., 2])
-        escaped[part] = out.mean(1)
+        escaped[part] = left_mesh.mean(1)
 
     for_blocks(run, len(position), max(RAYS_AT_ONCE // rays, 1), threads, progress)
     return S, escaped

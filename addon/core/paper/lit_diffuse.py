@@ -16,7 +16,7 @@ from ..scene.rays import RayScene
 from ..scene.visibility import FrameView, Observations, bytes_of_frame, observe, view_frame
 from .p_square import PSquare, Summary
 
-Seen = tuple[int, FrameView, Pixels, Observations]
+FrameObservations = tuple[int, FrameView, Pixels, Observations]
 """A frame's index, what its camera sees of the mesh, its pixels, and what it says of the elements."""
 
 
@@ -40,7 +40,7 @@ def lit_diffuse(
     read : callable
         Gives a frame's pixels.
     also : callable, optional
-        Is shown each frame too, as `Seen`.
+        Called with each frame too, as `FrameObservations`.
 
     Returns
     -------
@@ -54,18 +54,18 @@ def lit_diffuse(
     InterruptedRun
         From `progress`.
     """
-    groups, each = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
+    groups, frame_bytes = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
     median = PSquare(len(atlas))
 
-    def look(index: int) -> Seen:
+    def look(index: int) -> FrameObservations:
         pixels = read(frames[index])
         view = view_frame(frames[index].camera, mesh, scene)
         return index, view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
-    for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads, each=each):
-        median.add(seen.element, seen.radiance)
+    for index, view, pixels, observations in ordered_map(look, range(len(frames)), threads, each=frame_bytes):
+        median.add(observations.element, observations.radiance)
         if also is not None:
-            also(index, view, pixels, seen)
+            also(index, view, pixels, observations)
         if progress is not None:
             progress.update((index + 1) / len(frames))
     return median.result()

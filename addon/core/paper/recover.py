@@ -81,19 +81,19 @@ def recover(
         Radiance from directions ((k, 3) float32) in which rays leave the mesh.
     """
     atlas = surface.atlas
-    kept = SampleCollector(atlas, len(frames), seed)
+    collector = SampleCollector(atlas, len(frames), seed)
     L_d = lit_diffuse(
         surface.mesh, atlas, surface.scene, frames, read, threads=threads,
-        also=lambda index, view, pixels, seen: kept.add(index, seen),
+        also=lambda index, view, pixels, observations: collector.add(index, observations),
     ).median  # fmt: skip
     light = CapturedLight(surface.mesh, atlas, surface.scene, L_d, outside)
     S, _ = irradiance(light, atlas.position, atlas.normal, rays, threads=threads, seed=seed)
-    samples, fits = kept.result(), {}
+    samples, fits = collector.result(), {}
     for object_id in np.unique(atlas.object_id):
         index = usable(samples, atlas.object_id, object_id)
-        found = fit_object(light, atlas, L_d, samples, index, len(frames), rays, threads=threads, seed=seed)
-        if found is not None:
-            fits[int(object_id)] = found
+        target_fit = fit_object(light, atlas, L_d, samples, index, len(frames), rays, threads=threads, seed=seed)
+        if target_fit is not None:
+            fits[int(object_id)] = target_fit
     return Published(L_d, S, albedo(L_d, S), fits)
 
 
@@ -123,8 +123,8 @@ def fit_object(
     target = target_frame(frame_scores(light, position, normal, direction, samples.frame[index], frames))
     if target < 0:
         return None
-    own = samples.frame[index] == target
-    where = position[own], normal[own], direction[own]
-    A, B = reflected_parts(light, *where, PHI, rays, threads=threads, seed=seed)
-    lobe = fit_lobe(A, B, samples.radiance[index[own]] - L_d[element[own]])
-    return TargetFit(target, index[own], lobe)
+    in_target = samples.frame[index] == target
+    geometry = position[in_target], normal[in_target], direction[in_target]
+    A, B = reflected_parts(light, *geometry, PHI, rays, threads=threads, seed=seed)
+    lobe = fit_lobe(A, B, samples.radiance[index[in_target]] - L_d[element[in_target]])
+    return TargetFit(target, index[in_target], lobe)

@@ -37,8 +37,8 @@ def frame_scores(
     (frames,) float64
     """
     origins = light.scene.off_surface(position, normal)
-    seen = light.along(origins, mirrored(direction, normal).astype(np.float32))[0]
-    return np.bincount(frame, (seen @ LUMINANCE).astype(np.float64), frames)
+    radiance = light.along(origins, mirrored(direction, normal).astype(np.float32))[0]
+    return np.bincount(frame, (radiance @ LUMINANCE).astype(np.float64), frames)
 
 
 def target_frame(scores: np.ndarray) -> int:

@@ -68,7 +68,7 @@ class Room:
     @cached_property
     def names(self) -> dict[int, str]:
         """What the objects are called, by their number."""
-        return {one.object_id: one.name for one in self.instances}
+        return {instance.object_id: instance.name for instance in self.instances}
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Looked:
     target: int
 
 
-LOOKED = {one.__name__: one for one in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour, Coated)}
+LOOKED = {cls.__name__: cls for cls in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour, Coated)}
 """What a stored `Looked` may hold."""
 
 
@@ -122,7 +122,11 @@ def look_at(
     known : mapping of int to Looked, optional
         What was found of them before.
     """
-    guesses, known, given = {one.object_id for one in room.instances if one.guess}, known or {}, room.given
+    guesses, known, given = (
+        {instance.object_id for instance in room.instances if instance.guess},
+        known or {},
+        room.given,
+    )
 
     def look(object_id: int) -> Looked:
         if object_id in known:
@@ -132,34 +136,34 @@ def look_at(
             return Looked(*fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1)
         return Looked(*_look(room, maker, object_id, object_id in guesses))
 
-    found: dict[int, Looked] = {}
+    results: dict[int, Looked] = {}
     size = np.bincount(room.field.atlas.object_id, minlength=max(wanted, default=0) + 1)
-    order = sorted(wanted, key=lambda one: -size[one])  # the longest last would have one thread work alone
-    for object_id, one in zip(order, ordered_map(look, order, room.settings.threads, ahead=len(order)), strict=True):
-        found[object_id] = one
+    order = sorted(wanted, key=lambda object_id: -size[object_id])  # the longest last would have one thread work alone
+    for object_id, looked in zip(order, ordered_map(look, order, room.settings.threads, ahead=len(order)), strict=True):
+        results[object_id] = looked
         if room.progress is not None:
-            room.progress.update(0.7 * len(found) / len(wanted))
-    return {object_id: found[object_id] for object_id in wanted}
+            room.progress.update(0.7 * len(results) / len(wanted))
+    return {object_id: results[object_id] for object_id in wanted}
 
 
-def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
+def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     """Choose a model for each object, by what its frames and its class say; of those that are given, by that alone.
 
     Parameters
     ----------
-    found : mapping of int to Looked
+    looks : mapping of int to Looked
         What `look_at` found of each of them.
     """
-    choices = {i: one.choice for i, one in found.items()}
-    problems = {i: one.problem for i, one in found.items() if one.problem is not None}
-    targets = {i: one.target for i, one in found.items()}
+    choices = {i: looked.choice for i, looked in looks.items()}
+    problems = {i: looked.problem for i, looked in looks.items() if looked.problem is not None}
+    targets = {i: looked.target for i, looked in looks.items()}
     if "class-lobes" not in room.settings.without:
         # That two parts are walls by their shape says nothing of what they are painted with.
-        told = {one.object_id for one in room.instances if not one.guess}
-        reflecting = {i: choice for i, choice in choices.items() if i in told and not choice.model.gives_light}
+        named_ids = {instance.object_id for instance in room.instances if not instance.guess}
+        reflecting = {i: choice for i, choice in choices.items() if i in named_ids and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
-    order = sorted(found, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
+    order = sorted(looks, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
     intervals = ordered_map(
         lambda i: gloss_interval(choices[i], problems.get(i)), order, room.settings.threads, ahead=len(order)
     )
@@ -182,9 +186,9 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     if problem is not None and choice.fit is not None and "see-through" not in room.settings.without and not guess:
         behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
         lobe = choice.fit if choice.model.has_lobe else None
-        shown = judge(problem, behind, lobe, max(SIGMA_OF_MAD * choice.fit.residual, 1e-4))
-        if shown is not None:
-            choice = set_apart(choice, shown, is_sure(shown))
+        see_through = judge(problem, behind, lobe, max(SIGMA_OF_MAD * choice.fit.residual, 1e-4))
+        if see_through is not None:
+            choice = set_apart(choice, see_through, is_sure(see_through))
     if choice.model.has_albedo and not guess:
         choice, problem = _by_looks(room, maker, object_id, choice, problem)
     return choice, problem, target_frame(scores)
@@ -217,12 +221,12 @@ def _by_looks(
     index = maker.pick(object_id, LEVELS.of_object, LEVELS.views, least=1, seed=1)
     if not len(index):
         return choice, problem
-    whole = maker.problem(index, room.settings.specular_rays)
-    looks = compare(whole, irradiance)
+    full_problem = maker.problem(index, room.settings.specular_rays)
+    looks = compare(full_problem, irradiance)
     if looks is None:
         return choice, problem
-    found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
-    coat = None if found.model.has_lobe or "coat-by-looks" in without else compare_coat(whole, irradiance)
+    result = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, full_problem)
+    coat = None if result.model.has_lobe or "coat-by-looks" in without else compare_coat(full_problem, irradiance)
     if coat is not None:
-        found = coated_by_looks(found, coat)
-    return found, whole if found.looks is not None else problem
+        result = coated_by_looks(result, coat)
+    return result, full_problem if result.looks is not None else problem

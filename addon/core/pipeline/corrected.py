@@ -15,7 +15,7 @@ from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
 from ..evidence.light import spots
 from ..light.over_surface import RayCounts, irradiance
-from ..light.sun import put_in
+from ..light.sun import insert_sun
 from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
@@ -87,11 +87,11 @@ class Corrected(Stages):
 
     def albedo_of_all_but(self, without: set[int]) -> Albedo:
         """The same, but with none for some objects."""
-        found = self.specular()
-        apart = [m.object_id for m in found.materials if m.model.see_through]
-        albedo = self.albedo_under(self.irradiance, found.taken, without)
+        specular = self.specular()
+        see_through = [m.object_id for m in specular.materials if m.model.see_through]
+        albedo = self.albedo_under(self.irradiance, specular.taken, without)
         # What shows its background has no albedo that was measured.
-        origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
+        origin = np.where(np.isin(self.surface().atlas.object_id, see_through), np.int8(NO_ALBEDO), albedo.origin)
         return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)
 
     def albedo_under(
@@ -102,13 +102,13 @@ class Corrected(Stages):
         The objects `without` get none; by default the lamps that were found.
         """
         shading = self.shading()
-        atlas, lit = self.surface().atlas, self.lit_diffuse()
+        atlas, lit_diffuse = self.surface().atlas, self.lit_diffuse()
         without = shading.emitters if without is None else without
         if "shading" in self.settings.published:
-            return published_light.albedo_of(atlas, lit, irradiance, self.capture.instances, without, specular)
+            return published_light.albedo_of(atlas, lit_diffuse, irradiance, self.capture.instances, without, specular)
         return albedo_of(
             atlas,
-            lit,
+            lit_diffuse,
             irradiance,
             shading.relative_error,
             self.capture.instances,
@@ -143,7 +143,7 @@ class Corrected(Stages):
             irradiance=self.irradiance,
             albedo=self.albedo,
             materials=self.materials(),
-            coloured=frozenset(i for i, one in self.overrides.objects.items() if one.base_color is not None),
+            coloured=frozenset(i for i, override in self.overrides.objects.items() if override.base_color is not None),
             threads=self.settings.threads,
             seed=self.settings.seed,
         )
@@ -155,39 +155,41 @@ class Corrected(Stages):
 
     def sky(self) -> np.ndarray:
         """Radiance from outside with the sun in it, (h, w, 3) float32, row 0 the bottom."""
-        sky = put_in(self.shading().environment, self.shading().sun)
+        sky = insert_sun(self.shading().environment, self.shading().sun)
         return sky if self.white is None else sky * self.white.of_light
 
 
 def white_scale(run: Corrected) -> WhiteScale | None:
-    """What the known white of a run says whose stages are done; None if none is given."""
+    """What the known white of a run, whose stages are done, says; None if none is given."""
     white = run.overrides.white
     if white is None:
         return None
     atlas, ones = run.surface().atlas, np.ones(3, np.float32)
-    thing = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
-    name = thing if white.at is None else f"the spot of {thing}"
+    object_name = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
+    name = object_name if white.at is None else f"the spot of {object_name}"
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
     for _ in range(CORRECTED.rounds):
         albedo = run.albedo_under(before * scale, run.specular().taken, others)
-        own = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
+        chosen = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
         if white.at is not None:
-            own &= (
+            chosen &= (
                 np.linalg.norm(atlas.position - np.array(white.at, np.float32), axis=1)
                 < CORRECTED.around * atlas.texel_edge
             )
-        mean = np.average(albedo.rho[own], 0, atlas.area[own]) if own.any() else np.zeros(3)
+        mean = np.average(albedo.rho[chosen], 0, atlas.area[chosen]) if chosen.any() else np.zeros(3)
         if white.object_id in run.emitters or mean.min() <= 0:
-            told = f"No albedo of {name} was measured, so it can't be the white; it was left out."
-            return WhiteScale(ones, ones, told)
+            message = f"No albedo of {name} was measured, so it can't be the white; it was left out."
+            return WhiteScale(ones, ones, message)
         scale = (scale * mean / np.asarray(white.albedo)).astype(np.float32)
     direct = _direct_share(run)
     light = np.maximum(1 + (scale - 1) / direct, CORRECTED.least_light).astype(np.float32)
     warning = ""
     if scale.max() > CORRECTED.doubtful or scale.min() < 1 / CORRECTED.doubtful:
-        told = ", ".join(f"{one:.2f}" for one in scale)
-        warning = f"The white of {name} scales the light by {told} (red, green, blue); that is much: is it that white?"
+        factors = ", ".join(f"{factor:.2f}" for factor in scale)
+        warning = (
+            f"The white of {name} scales the light by {factors} (red, green, blue); that is much: is it that white?"
+        )
     return WhiteScale(scale, light, warning)
 
 
@@ -198,36 +200,38 @@ def _direct_share(run: Corrected) -> np.ndarray:
     chosen = chosen[seen[chosen]]
     lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
     direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))
-    part = irradiance(
+    direct_irradiance = irradiance(
         direct, chosen, **RAYS, interpolate=False, finest=1.0, threads=run.settings.threads, seed=run.settings.seed
     )[0]
-    whole = run.irradiance_found[chosen]
+    total_irradiance = run.irradiance_found[chosen]
     area = field.atlas.area[chosen, None]
-    return np.clip((area * part).sum(0) / np.maximum((area * whole).sum(0), 1e-20), 0.05, 1)
+    return np.clip((area * direct_irradiance).sum(0) / np.maximum((area * total_irradiance).sum(0), 1e-20), 0.05, 1)
 
 
 def with_base_colors(albedo: Albedo, atlas: Atlas, overrides: Overrides) -> Albedo:
     """The albedo with the given base colours as means over what was measured; texture is kept as variation about."""
-    given = {i: one.base_color for i, one in overrides.objects.items() if one.base_color is not None}
+    given = {i: override.base_color for i, override in overrides.objects.items() if override.base_color is not None}
     if not given:
         return albedo
     rho, error = albedo.rho.copy(), albedo.error.copy()
     for object_id, colour in given.items():
-        own = atlas.elements_of(object_id)
-        if not len(own):
+        elements = atlas.elements_of(object_id)
+        if not len(elements):
             continue
-        told = own[albedo.origin[own] == MEASURED]
-        rho[own] = _coloured(rho[own], np.isin(own, told), atlas.area[own], np.asarray(colour, np.float32))
-        error[own] = 0
+        measured = elements[albedo.origin[elements] == MEASURED]
+        rho[elements] = _coloured(
+            rho[elements], np.isin(elements, measured), atlas.area[elements], np.asarray(colour, np.float32)
+        )
+        error[elements] = 0
     return replace(albedo, rho=rho, error=error)
 
 
-def _coloured(rho: np.ndarray, told: np.ndarray, area: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """Albedo (k, 3) brought to a mean `colour` over the elements `told`; flat where there is nothing to bring."""
-    if not told.any():
+def _coloured(rho: np.ndarray, measured: np.ndarray, area: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Albedo (k, 3) scaled to a mean `colour` over the elements `measured`; constant where there are none."""
+    if not measured.any():
         return np.broadcast_to(colour, rho.shape)
     for _ in range(CORRECTED.rounds):  # what is clamped at 1 lowers the mean
-        mean = np.average(rho[told], 0, area[told])
+        mean = np.average(rho[measured], 0, area[measured])
         rho = np.where(mean < LEVELS.dark, colour, np.minimum(rho * (colour / np.maximum(mean, LEVELS.dark)), 1))
     return rho.astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""All light that no frame tells of by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
+"""All light that no frame shows by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
 
 from collections.abc import Collection
 
@@ -32,16 +32,16 @@ def find_all_light(
     if field.sun is not None or not len(light.received) or "sun" in without:
         return light, field.sun
     lamps = [lamp.object_id for lamp in light.lamps]
-    lit = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
-    solved = find_sun(
-        field, light.element, light.received, lamps, good, lambda element: irradiance_at(lit, element, seed), seed
+    lit_field = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
+    sun_fit = find_sun(
+        field, light.element, light.received, lamps, good, lambda element: irradiance_at(lit_field, element, seed), seed
     )
-    if solved is None:
+    if sun_fit is None:
         return light, None
-    lit_by_sun = field.with_sun(solved.sun)
-    again = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
-    if not len(again.received):
-        return again, solved.sun
-    # Lamps and sky that stood in for the sun no longer do, so its strength is told anew beside them.
-    others = again.received - from_sun(field.with_sun(solved.sun), light.element)
-    return again, solved.under(light.element, np.maximum(others, 0) / np.maximum(light.received, 1e-12))
+    lit_by_sun = field.with_sun(sun_fit.sun)
+    light_with_sun = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
+    if not len(light_with_sun.received):
+        return light_with_sun, sun_fit.sun
+    # Lamps and sky that stood in for the sun no longer do, so its strength is solved for again beside them.
+    others = light_with_sun.received - from_sun(field.with_sun(sun_fit.sun), light.element)
+    return light_with_sun, sun_fit.under(light.element, np.maximum(others, 0) / np.maximum(light.received, 1e-12))

@@ -1,6 +1,6 @@
 """The passes over all frames: what L_d, the sky, the specular fit and the lamps' edges each take from them.
 
-One pass, a second where the first tells that poses are off, and one more that makes L_d sharper.
+One pass, a second where the first shows that poses are off, and one more that makes L_d sharper.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from .surface import STAGE as SURFACE
 
 STAGE = Stage("lit_diffuse", Path(__file__), (SURFACE,), ("refine_poses", "median", "sharpen", "seed"))
 
-ASKED: Block[tuple[int, int]] = (32, 4096)
-"""Frames, and elements, of which it is found how many of these those see, before all are read."""
+SAMPLED: Block[tuple[int, int]] = (32, 4096)
+"""Numbers of frames and of elements from which the number of observations is estimated before all are read."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Observed:
     poses : Poses
         Where the frames were found to be.
     calibration : Calibration
-        What the codes of frames mean whose curve nobody told.
+        What the codes of frames mean whose transfer curve is unknown.
     """
 
     lit_diffuse: LitDiffuse
@@ -74,15 +74,17 @@ class Observed:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """What is stored of it."""
-        parts = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {f"{name}.{one.name}": getattr(part, one.name) for name, part in parts.items() for one in fields(part)}
+        parts = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {
+            f"{name}.{field.name}": getattr(part, field.name) for name, part in parts.items() for field in fields(part)
+        }
 
     @staticmethod
     def from_arrays(arrays: dict[str, np.ndarray]) -> Observed:
         """The inverse of `arrays`."""
         kinds = (LitDiffuse, Environment, Samples, Poses, Calibration)
         return Observed(*(
-            kind(**{one.name: arrays[f"{part.name}.{one.name}"] for one in fields(kind)})
+            kind(**{field.name: arrays[f"{part.name}.{field.name}"] for field in fields(kind)})
             for part, kind in zip(fields(Observed), kinds, strict=True)
         ))  # fmt: skip
 
@@ -114,8 +116,8 @@ class FrameReader:
                 self.blind.append(frame.name)
             return pixels
         except BadInputError as error:
-            if (told := f"{error} It was left out.") not in self.bad:
-                self.bad.append(told)
+            if (message := f"{error} It was left out.") not in self.bad:
+                self.bad.append(message)
             if len(self.bad) > MAX_BAD_SHARE * self._count:
                 raise BadInputError(
                     f"{len(self.bad)} of {self._count} frames can't be read; the first: {error}"
@@ -124,11 +126,14 @@ class FrameReader:
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
 
 
-def ask_for_disk(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
-    """Raise `StorageError` where what `Exact` keeps of the frames, as some of them tell, does not fit on the disk."""
-    some, points = frames[:: -(-len(frames) // ASKED[0])], surface.atlas.position[:: -(-len(surface.atlas) // ASKED[1])]
-    seen = sum(len(sees(frame.camera, points, surface.scene)[0]) for frame in some)
-    observations = seen / (len(some) * len(points)) * len(frames) * len(surface.atlas)
+def check_disk_space(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
+    """Raise `StorageError` where what `Exact` keeps, estimated from some of the frames, does not fit on the disk."""
+    sampled_frames, points = (
+        frames[:: -(-len(frames) // SAMPLED[0])],
+        surface.atlas.position[:: -(-len(surface.atlas) // SAMPLED[1])],
+    )
+    seen = sum(len(sees(frame.camera, points, surface.scene)[0]) for frame in sampled_frames)
+    observations = seen / (len(sampled_frames) * len(points)) * len(frames) * len(surface.atlas)
     need, free = int(observations) * Exact.RECORD.itemsize, shutil.disk_usage(folder).free
     if observations > Exact.HELD and need > free:
         raise StorageError(
@@ -163,22 +168,22 @@ class Passes:
     ) -> LitDiffuse:
         """L_d as the settings ask for it; `also` and errors as of `accumulate`."""
         surface, s = self.surface, self.settings
-        where = surface.mesh, surface.atlas, surface.scene, frames, self.read
+        inputs = surface.mesh, surface.atlas, surface.scene, frames, self.read
         if "lit_diffuse" in s.published:
-            return running_lit_diffuse(*where, threads=s.threads, also=also, progress=progress)
+            return running_lit_diffuse(*inputs, threads=s.threads, also=also, progress=progress)
         return accumulate(
-            *where, median=s.median, edge_tier="edge-tier" not in s.without, seed=s.seed, threads=s.threads,
+            *inputs, median=s.median, edge_tier="edge-tier" not in s.without, seed=s.seed, threads=s.threads,
             folder=self.folder, also=also, groups=surface.groups, progress=progress,
         )  # fmt: skip
 
     def sharpened(
-        self, lit: LitDiffuse, frames: Sequence[Frame], progress: Progress | Rounds, **how: Any
+        self, lit_diffuse: LitDiffuse, frames: Sequence[Frame], progress: Progress | Rounds, **options: Any
     ) -> LitDiffuse:
-        """L_d with its detail given back; `how` and errors as of `sharpen.sharpened`."""
+        """L_d with its detail given back; `options` and errors as of `sharpen.sharpened`."""
         s = self.settings
         return sharpened(
-            lit, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads, folder=self.folder,
-            progress=progress, **how,
+            lit_diffuse, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads,
+            folder=self.folder, progress=progress, **options,
         )  # fmt: skip
 
     def once(self, frames: Sequence[Frame], poses: Poses, progress: Progress | Rounds) -> Observed:
@@ -193,21 +198,21 @@ class Passes:
         """
         frames = poses.of(frames)
         sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
-        kept = SampleCollector(self.surface.atlas, len(frames), self.settings.seed, self.surface.mesh.geometry[0])
+        collector = SampleCollector(self.surface.atlas, len(frames), self.settings.seed, self.surface.mesh.geometry[0])
 
-        def also(index, view, pixels, seen):
+        def also(index, view, pixels, observations):
             sky.add(view, pixels)
-            kept.add(index, seen, view)
+            collector.add(index, observations, view)
 
-        lit = self.lit_diffuse(frames, progress, also)
-        if not lit.seen.any():
+        lit_diffuse = self.lit_diffuse(frames, progress, also)
+        if not lit_diffuse.seen.any():
             raise BadInputError(
                 "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
             )
-        return Observed(lit, sky.result(), kept.result(), poses, Calibration.none(len(frames)))
+        return Observed(lit_diffuse, sky.result(), collector.result(), poses, Calibration.none(len(frames)))
 
     def all(self, frames: Sequence[Frame], progress: Progress) -> Observed:
-        """What `once` finds with the poses as read, or put right; errors as its."""
+        """What `once` finds with the poses as read, or refined; errors as there."""
         surface, settings, rounds = self.surface, self.settings, Rounds(progress, 0, 1)
         calibration = Calibration.none(len(frames))
         if "radiometric-calibration" not in settings.without and any(frame.uncalibrated for frame in frames):
@@ -218,26 +223,28 @@ class Passes:
             )  # fmt: skip
             frames = calibration.of(frames)
             rounds.next()
-        found = self.once(frames, Poses.as_read(frames), rounds)
+        observed = self.once(frames, Poses.as_read(frames), rounds)
         if settings.refine_poses and "pose-refinement" not in settings.without:
-            lit = found.lit_diffuse
+            lit_diffuse = observed.lit_diffuse
             room = LightField(
-                surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment,
+                surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit_diffuse.radiance), observed.environment,
                 lookup=surface.lookup,
             )  # fmt: skip
             rounds.next()
-            poses = refine_poses(frames, self.read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+            poses = refine_poses(
+                frames, self.read, Texture(room, lit_diffuse.seen), threads=settings.threads, progress=rounds
+            )
             del room
             give_back()
-            found = replace(found, poses=poses)
+            observed = replace(observed, poses=poses)
             if poses.moved.any():
                 rounds.next()
-                found = self.once(frames, poses, rounds)
+                observed = self.once(frames, poses, rounds)
         if settings.sharpen and "sharpening" not in settings.without:
             rounds.next()
-            lit = self.sharpened(found.lit_diffuse, found.poses.of(frames), rounds, groups=surface.groups)
-            found = replace(found, lit_diffuse=lit)
-        return replace(found, calibration=calibration)
+            lit_diffuse = self.sharpened(observed.lit_diffuse, observed.poses.of(frames), rounds, groups=surface.groups)
+            observed = replace(observed, lit_diffuse=lit_diffuse)
+        return replace(observed, calibration=calibration)
 
 
 def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
@@ -247,7 +254,7 @@ def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
     mesh = replace(capture.mesh, vertices=passes.surface.mesh.vertices)
     atlas, stored = passes.surface.atlas, mesh.lit
     if isinstance(stored, LitTexture):
-        lit = lit_from_picture(mesh, stored, atlas, progress)
+        lit_diffuse = lit_from_picture(mesh, stored, atlas, progress)
     else:
-        lit = lit_from_tiles(mesh, atlas, progress)
-    return Observed(lit, Environment.dark(), Samples.none(), Poses.as_read(()), Calibration.none(0))
+        lit_diffuse = lit_from_tiles(mesh, atlas, progress)
+    return Observed(lit_diffuse, Environment.dark(), Samples.none(), Poses.as_read(()), Calibration.none(0))

@@ -1,6 +1,6 @@
 """Base colour in parts, for close work: an image for each object, or UDIM tiles, as fine as the frames resolve.
 
-The recovery itself goes on in the room's atlas, whose texels are as large as the frames resolve the room on the whole.
+The recovery itself works on the room's atlas, whose texels are as large as the frames resolve the room on the whole.
 An object that they resolve finer gets finer texels: the frames are looked at once more for what they show there, and
 base colour is multiplied by what this differs from the room's own lit diffuse texture.
 """
@@ -33,7 +33,7 @@ from .frames import Passes
 from .params import PARTS
 
 LOOKED: Shown[float] = 0.3
-"""Share of the writing, as progress tells it, that the look at the frames takes."""
+"""Share of the writing, in terms of progress, that the look at the frames takes."""
 
 STAGE = "detail"
 FOLDER = "objects"
@@ -70,7 +70,7 @@ class Closer:
     atlas : Atlas
         Over that sheet.
     radiance : (n, 3) float32
-        L_d of its elements; NaN where too little tells.
+        L_d of its elements; NaN where too few observations show it.
     """
 
     sheet: Pages
@@ -88,15 +88,15 @@ class Parting:
 
 def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
     """Edge in metres of the surface that a pixel covers, by object: the lower quartile over all views of it."""
-    found: dict[int, list[np.ndarray]] = {}
+    edges: dict[int, list[np.ndarray]] = {}
     for camera in cameras:
         pixels, _, hits = sparse_hits(surface.scene, camera)
         edge, owner = pixel_edges(camera, pixels, hits), surface.mesh.object_id[hits.triangle]
         for number in np.unique(owner):
-            found.setdefault(int(number), []).append(edge[(owner == number) & (edge > 0)])
+            edges.setdefault(int(number), []).append(edge[(owner == number) & (edge > 0)])
     return {
         number: float(np.percentile(np.concatenate(all_edges), 25))
-        for number, all_edges in found.items()
+        for number, all_edges in edges.items()
         if sum(map(len, all_edges))
     }
 
@@ -110,8 +110,8 @@ def scales(run: Corrected) -> dict[int, float]:
     }
     finer = {number: float(np.clip(surface.texel_size / texel, 1, PARTS.finest)) for number, texel in wanted.items()}
     finer = {number: scale for number, scale in finer.items() if scale > PARTS.worth}
-    taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
-    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > PARTS.most_texels:
+    texels = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
+    while finer and texels.sum() + sum((scale**2 - 1) * texels[i] for i, scale in finer.items()) > PARTS.most_texels:
         finer = {number: max(0.95 * scale, 1.0) for number, scale in finer.items()}
     return {number: scale for number, scale in finer.items() if scale > PARTS.worth}
 
@@ -129,26 +129,26 @@ def look_closer(run: Corrected) -> Parting:
     InterruptedRun
         From the run's progress.
     """
-    surface, own = run.surface(), stored_key(run)
-    stored, meta = run.store.load(STAGE, own), run.store.load_meta(STAGE, own) or {}
+    surface, detail_key = run.surface(), stored_key(run)
+    stored, meta = run.store.load(STAGE, detail_key), run.store.load_meta(STAGE, detail_key) or {}
     wanted = scales(run) if stored is None else dict(meta["wanted"])
     mesh, uv, size = surface.mesh, surface.atlas.uv, surface.atlas.size
     pages = lay_out(run.settings.atlas, mesh.triangles, uv, mesh.object_id, size, wanted, run.settings.atlas_size)
     finer = {number: scale for number, scale in pages.scale.items() if scale > 1}
     if not finer:
         if stored is None:
-            run.store.save(STAGE, own, {}, {"wanted": [], "finer": []})
+            run.store.save(STAGE, detail_key, {}, {"wanted": [], "finer": []})
         return Parting(pages)
     # Their islands alone, on a sheet of their own: the time that this takes is theirs, not the room's.
     chosen = np.flatnonzero(np.isin(mesh.object_id, list(finer)))
-    part = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
-    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, sys.maxsize)
-    atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
+    finer_mesh = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
+    sheet = lay_out(OBJECT, finer_mesh.triangles, uv[chosen], finer_mesh.object_id, size, finer, sys.maxsize)
+    atlas = make_atlas(finer_mesh, sheet.sheet_uv, sheet.size)
     if stored is None or dict(meta["finer"]) != finer:
-        found = _looked(run, part, atlas, chosen)
-        told = (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
-        stored = {"radiance": np.where(told[:, None], found.radiance, np.nan).astype(np.float32)}
-        run.store.save(STAGE, own, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
+        lit_diffuse = _finer_lit_diffuse(run, finer_mesh, atlas, chosen)
+        measured = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
+        stored = {"radiance": np.where(measured[:, None], lit_diffuse.radiance, np.nan).astype(np.float32)}
+        run.store.save(STAGE, detail_key, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
     return Parting(pages, Closer(sheet, atlas, stored["radiance"]))
 
 
@@ -157,25 +157,29 @@ def stored_key(run: Corrected) -> str:
     return key(STAGE, run.store.stored_key("lit_diffuse"))
 
 
-def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
+def _finer_lit_diffuse(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
     """L_d of the elements of an atlas over a `part` of the room's mesh: its triangles `chosen`."""
     s, surface = run.settings, run.surface()
-    place = np.full(len(surface.mesh.triangles), -1)
-    place[chosen] = np.arange(len(chosen))
+    local_index = np.full(len(surface.mesh.triangles), -1)
+    local_index[chosen] = np.arange(len(chosen))
     find = ElementLookup(part, atlas)
 
     def lookup(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        own = place[triangle]
-        element = np.full(len(own), -1, np.int32)
-        there = own >= 0
-        element[there] = find(own[there], u[there], v[there])
+        local = local_index[triangle]
+        element = np.full(len(local), -1, np.int32)
+        present = local >= 0
+        element[present] = find(local[present], u[present], v[present])
         return element
 
     rounds = Rounds(run.progress, 0, LOOKED)
     passes = Passes(replace(surface, atlas=atlas), run.read, s, run.store.folder)
-    found = passes.lit_diffuse(run.frames, rounds)
+    lit_diffuse = passes.lit_diffuse(run.frames, rounds)
     rounds.next()
-    return passes.sharpened(found, run.frames, rounds, lookup=lookup) if s.sharpen and found.seen.any() else found
+    return (
+        passes.sharpened(lit_diffuse, run.frames, rounds, lookup=lookup)
+        if s.sharpen and lit_diffuse.seen.any()
+        else lit_diffuse
+    )
 
 
 def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Parts:
@@ -193,17 +197,17 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
     if parting.closer is not None:
         pages.multiply(sheet, parting.closer.sheet, finer_detail(run, parting.closer))
     materials = {m.object_id: m for m in run.materials()}
-    shown = {number: m for number, m in materials.items() if m.model.has_diffuse}
+    diffuse = {number: m for number, m in materials.items() if m.model.has_diffuse}
     if run.settings.atlas == OBJECT:
         images = {
-            page.number: f"{FOLDER}/{file_name(shown[page.number].name)} base_color.exr"
+            page.number: f"{FOLDER}/{file_name(diffuse[page.number].name)} base_color.exr"
             for page in pages.pages
-            if page.number in shown
+            if page.number in diffuse
         }
         files = {images[page.number]: page for page in pages.pages if page.number in images}
         tiles: tuple[int, ...] = ()
     else:
-        images = dict.fromkeys(shown, TILE)
+        images = dict.fromkeys(diffuse, TILE)
         files = {TILE.replace("<UDIM>", str(page.number)): page for page in pages.pages}
         tiles = tuple(page.number for page in pages.pages)
     remove_parts(run, set(files))
@@ -218,10 +222,12 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
 
 def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
-    surface, lit, atlas = run.surface(), run.lit_diffuse(), closer.atlas
-    good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
-    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
-    room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
+    surface, lit_diffuse, atlas = run.surface(), run.lit_diffuse(), closer.atlas
+    good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
+    radiance_and_weight = np.concatenate([np.where(good[:, None], lit_diffuse.radiance, 0), good[:, None]], 1).astype(
+        np.float32
+    )
+    room = closer.sheet.image(surface.atlas.image(radiance_and_weight), _owner(run)).reshape(-1, 4)[atlas.texel]
     floor = np.float32(max(LEVELS.dark * run.median_radiance, 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)

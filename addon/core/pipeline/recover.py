@@ -47,7 +47,7 @@ class Recovery(Corrected):
             pass
 
     def let_go(self) -> None:
-        """Hold surface, materials and median radiance alone, which a scene is made of; no more may be asked for then.
+        """Hold surface, materials and median radiance alone, which a scene is made of; nothing else may be used then.
 
         Blender takes as much for the room's mesh as all the stages' values.
         """
@@ -69,13 +69,13 @@ class Recovery(Corrected):
     def write_images(self) -> dict[str, Any]:
         """Write the result folder's images, materials.json and report.html; returns the report that this shows."""
         self.look_closer()
-        lit = self.lit_diffuse()
+        lit_diffuse = self.lit_diffuse()
         # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
         images: dict[str, Callable[[], np.ndarray]] = {
             "albedo": lambda: self.albedo.rho,
             "base_color": self.base_color,
             "shading": lambda: self.irradiance,
-            "lit_diffuse": lambda: np.where(lit.seen[:, None], lit.radiance, np.float32(0)),
+            "lit_diffuse": lambda: np.where(lit_diffuse.seen[:, None], lit_diffuse.radiance, np.float32(0)),
             "coverage": self._coverage,
             "albedo_error": lambda: self.evidence.texels.albedo,
             "evidence": self.evidence.shares,
@@ -85,24 +85,29 @@ class Recovery(Corrected):
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", self.over_atlas(name, images[name]())[::-1])
 
-        begun = LOOKED if self._parting else 0.0
+        first_share = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
-            self.progress.update(begun + (0.5 - begun) * done / len(images))
+            self.progress.update(first_share + (0.5 - first_share) * done / len(images))
         self.store.write_exr("environment.exr", self.sky()[::-1])
         self._write_openings()
         if self.settings.atlas == ROOM:
             remove_parts(self)
         elif self._parting is not None:
             self.parts = write_parts(self, self._parting, self.over_atlas("base_color", images["base_color"]()))
-        known: dict[int, dict[str, Any]] = {
-            one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects
+        details: dict[int, dict[str, Any]] = {
+            evidence.object_id: {"evidence": dataclasses.asdict(evidence)} for evidence in self.evidence.objects
         }
         for number, name in (self.parts.images if self.parts else {}).items():
-            known.setdefault(number, {})["image"] = name
-        objects = [{"name": m.name} | m.as_dict() | known.get(m.object_id, {}) for m in self.materials()]
-        told = {"run": self.run_key, "layout": self.layout_key, "capture": self.capture.root.name, "objects": objects}
-        told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
-        self.store.write_json("materials.json", told)
+            details.setdefault(number, {})["image"] = name
+        objects = [{"name": m.name} | m.as_dict() | details.get(m.object_id, {}) for m in self.materials()]
+        materials = {
+            "run": self.run_key,
+            "layout": self.layout_key,
+            "capture": self.capture.root.name,
+            "objects": objects,
+        }
+        materials |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
+        self.store.write_json("materials.json", materials)
         self.progress.update(0.6)
         report = self.report()
         write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, report).encode())
@@ -115,8 +120,12 @@ class Recovery(Corrected):
             return NOTHING
         surface, albedo = self.surface(), self.albedo
         measured = albedo.origin == MEASURED
-        # What is told by its shape alone may hold several materials: a wall its pictures.
-        guessed = [one.object_id for one in self.capture.instances if one.guess and one.class_name != "floor"]
+        # What was segmented by its shape alone may hold several materials: a wall its pictures.
+        guessed = [
+            instance.object_id
+            for instance in self.capture.instances
+            if instance.guess and instance.class_name != "floor"
+        ]
         to_texture = (albedo.origin == FILLED) & ~np.isin(surface.atlas.object_id, guessed)
         # E is off for neighbours alike, which makes no texture.
         error = relative_error(
@@ -128,21 +137,21 @@ class Recovery(Corrected):
         """The image `name` of the elements' values ((n, c) float32), with texture where there is any, (s, s, c)."""
         atlas, texture = self.surface().atlas, self.texture
         image = atlas.image(values)
-        shown = image.reshape(-1, image.shape[2])  # a view
+        texels = image.reshape(-1, image.shape[2])  # a view
         if name == "albedo":
-            shown[texture.texel] = texture.rho
+            texels[texture.texel] = texture.rho
         elif name == "base_color":
-            shown[texture.texel] = self.base_color_of(texture.rho, atlas.object_id[atlas.padding[texture.texel]])
+            texels[texture.texel] = self.base_color_of(texture.rho, atlas.object_id[atlas.padding[texture.texel]])
         elif name == "coverage":
-            shown[texture.texel, 2] += TEXTURED - FILLED
+            texels[texture.texel, 2] += TEXTURED - FILLED
         return image
 
     def _coverage(self) -> np.ndarray:
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
-        lit = self.lit_diffuse()
+        lit_diffuse = self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance, 1e-30)
-        spread = lit.interquartile_range.mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
-        parts = (lit.count, spread, self.albedo.origin + CLOSED * self.closing)
+        spread = lit_diffuse.interquartile_range.mean(1) / np.maximum(np.nan_to_num(lit_diffuse.radiance).mean(1), dark)
+        parts = (lit_diffuse.count, spread, self.albedo.origin + CLOSED * self.closing)
         return np.stack([part.astype(np.float32) for part in parts], -1)
 
     def _write_openings(self) -> None:
@@ -152,12 +161,13 @@ class Recovery(Corrected):
         if not panels:
             self.store.path(OPENINGS).unlink(missing_ok=True)
             return
-        shift = self.capture.mesh.vertices[0] - self._near.mesh.vertices[0]
+        shift = self.capture.mesh.vertices[0] - self._centred.mesh.vertices[0]
         light = np.ones(3) if self.white is None else self.white.of_light
-        told = [
-            {"radiance": (one.radiance * light).tolist(), "corners": (one.corners + shift).tolist()} for one in panels
+        entries = [
+            {"radiance": (panel.radiance * light).tolist(), "corners": (panel.corners + shift).tolist()}
+            for panel in panels
         ]
-        self.store.write_json(OPENINGS, {"openings": told})
+        self.store.write_json(OPENINGS, {"openings": entries})
 
     def _unseen_closing(self) -> np.ndarray:
         """Corners of the faces that close the mesh and that no frame saw, (t, 3, 3) float32."""

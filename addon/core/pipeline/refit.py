@@ -44,7 +44,7 @@ class Result:
         Its materials.json.
     overrides : Overrides
         What is to be heeded now.
-    asked : frozenset of int
+    requested : frozenset of int
         Objects that are to be fitted again whether something new is given of them or not.
     """
 
@@ -52,7 +52,7 @@ class Result:
     report: dict[str, Any]
     materials: dict[str, Any]
     overrides: Overrides
-    asked: frozenset[int]
+    requested: frozenset[int]
 
     @property
     def settings(self) -> Settings:
@@ -62,13 +62,13 @@ class Result:
     @property
     def given(self) -> dict[int, dict]:
         """What was given of each object when the result was written."""
-        return {one["object_id"]: one.get("given") or {} for one in self.materials["objects"]}
+        return {entry["object_id"]: entry.get("given") or {} for entry in self.materials["objects"]}
 
     @property
     def changed(self) -> set[int]:
         """Objects of which something else is given now, and those that are the same as one of them."""
         before = self.given
-        first = {i for i in before if before[i] != self.overrides.of(i).as_dict()} | self.asked
+        first = {i for i in before if before[i] != self.overrides.of(i).as_dict()} | self.requested
         return {i for i in before if {i, *self.overrides.chain(i)} & first}
 
 
@@ -82,21 +82,21 @@ def open_result(
     MissingStageError
         No finished result is there.
     BadInputError
-        An object is unknown, nothing is asked for, or a file is damaged.
+        An object is unknown, nothing is requested, or a file is damaged.
     """
     folder = Path(folder)
     room = read_room(folder)
-    known = {one.object_id: one for one in room.capture.instances}
-    for one in objects:
-        if one not in known:
-            raise BadInputError(f"Result '{folder}' has no object {one}; its objects are listed in {MATERIALS}.")
+    known = {instance.object_id: instance for instance in room.capture.instances}
+    for object_id in objects:
+        if object_id not in known:
+            raise BadInputError(f"Result '{folder}' has no object {object_id}; its objects are listed in {MATERIALS}.")
     overrides = heeded(folder, known, override, heed_kept)
     try:
         report, materials = (json.loads((folder / name).read_text(encoding="utf-8")) for name in (REPORT, MATERIALS))
         if report.get("code") != code():
             raise _again(folder, "another version of Scan Relight made it")
         result = Result(room, report, materials, overrides, frozenset(objects))
-        result.settings, result.given  # noqa: B018  (what is damaged is told now)
+        result.settings, result.given  # noqa: B018  (damage is reported now)
     except FileNotFoundError as error:
         raise _again(folder, f"'{REPORT}' is missing") from error
     except DAMAGE as error:
@@ -148,7 +148,7 @@ class Refit(Recovery):
             raise _again(store.folder, "what its frames show of finer texels was cleared")
         self._specular_before = self._load_specular()
 
-    def _taken(self, capture: Capture, settings: Settings) -> Capture:
+    def _with_chosen_frames(self, capture: Capture, settings: Settings) -> Capture:
         return capture  # the room has those that the run looked at
 
     def _first_key(self, stage: Stage) -> str:
@@ -158,12 +158,14 @@ class Refit(Recovery):
         """The specular stage as it is stored, and what was given to it."""
         stored = self.store.stored_key("specular")
         meta = self.store.load_meta("specular", stored) if stored else None
-        known = [one.object_id for one in self.capture.instances]
-        was = parse((meta or {}).get("overrides", {}), "specular", known)
-        arrays = self.store.load("specular", stored) if stored and stored == self.keys_under(was)["specular"] else None
+        known = [instance.object_id for instance in self.capture.instances]
+        overrides = parse((meta or {}).get("overrides", {}), "specular", known)
+        arrays = (
+            self.store.load("specular", stored) if stored and stored == self.keys_under(overrides)["specular"] else None
+        )
         if arrays is None:
             raise _again(self.store.folder, "its stages were cleared or are another run's")
-        return Specular.from_store(arrays, meta or {}), was.lobes()
+        return Specular.from_store(arrays, meta or {}), overrides.lobes()
 
     @cached_property
     def touched(self) -> set[int]:
@@ -173,24 +175,26 @@ class Refit(Recovery):
     @cached_property
     def fitted_again(self) -> set[int]:
         """Those of them that are fitted: something else is given of their highlight, or nothing new at all."""
-        before, now, given = self._specular_before[1], self.overrides.lobes(), self.result.given
-        first = {
+        before, current, given = self._specular_before[1], self.overrides.lobes(), self.result.given
+        changed = {
             i
             for i in self.touched
-            if before.get(i) != now.get(i) or i in self.result.asked and given[i] == self.overrides.of(i).as_dict()
+            if before.get(i) != current.get(i)
+            or i in self.result.requested
+            and given[i] == self.overrides.of(i).as_dict()
         }
-        return {i for i in self.touched if {i, *self.overrides.chain(i)} & first}
+        return {i for i in self.touched if {i, *self.overrides.chain(i)} & changed}
 
     def refit(self) -> None:
         """Fit the objects again and store the stage."""
-        found, again = self._specular_before[0], self.fitted_again
+        specular, objects = self._specular_before[0], self.fitted_again
         for stage in ("surface", "lit_diffuse", "shading"):
             getattr(self, stage)()
         self.progress.stage("specular")
-        if again:
-            found = self.fitted(SPECULAR.settings(self.settings), Held(found, again))
-            self.store.save("specular", self.keys["specular"], *found.to_store(self.overrides))
-        self.done["specular"] = found
+        if objects:
+            specular = self.fitted(SPECULAR.settings(self.settings), Held(specular, objects))
+            self.store.save("specular", self.keys["specular"], *specular.to_store(self.overrides))
+        self.done["specular"] = specular
         self.progress.done()
 
     def report(self) -> dict[str, Any]:
@@ -202,7 +206,7 @@ class Refit(Recovery):
             if name in new["figures"]
         }
         figures = {name: value for name, value in old["figures"].items() if not name.startswith("white_")} | models
-        warnings = [one for one in old["warnings"] if one != old.get("white_warning")]
-        told = {"white_warning": self.white.warning} if self.white is not None and self.white.warning else {}
-        result = {name: value for name, value in old.items() if name != "white_warning"} | told
-        return result | {"figures": figures, "warnings": [*warnings, *told.values()], "code": code()}
+        warnings = [warning for warning in old["warnings"] if warning != old.get("white_warning")]
+        white_warning = {"white_warning": self.white.warning} if self.white is not None and self.white.warning else {}
+        result = {name: value for name, value in old.items() if name != "white_warning"} | white_warning
+        return result | {"figures": figures, "warnings": [*warnings, *white_warning.values()], "code": code()}

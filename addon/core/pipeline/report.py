@@ -22,11 +22,11 @@ def make_report(run: Corrected) -> dict[str, Any]:
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
         "passes_of_packages": [
-            {"name": one.name, "stage": one.stage, "package": one.origin or of_thing(one.run)}
+            {"name": item.name, "stage": item.stage, "package": item.origin or of_thing(item.run)}
             for stage in run.done
-            for one in following(stage, run.settings.without)
+            for item in following(stage, run.settings.without)
         ],
-        "warnings": [*run.capture.warnings, *map(_done_anew, run.store.damaged), *run.read.bad],
+        "warnings": [*run.capture.warnings, *map(_recomputed, run.store.damaged), *run.read.bad],
     }
     figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}
     if "surface" in run.done:
@@ -35,7 +35,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
         figures["texel_metres"] = surface.texel_size
         _report_surface(run, figures, result["warnings"])
     if "lit_diffuse" in run.done:
-        _report_lit(run, figures, result["warnings"])
+        _report_lit_diffuse(run, figures, result["warnings"])
     if "shading" in run.done:
         _report_shading(run, figures, result["warnings"])
     if "specular" in run.done:
@@ -50,7 +50,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
     return result
 
 
-def _done_anew(stage: str) -> str:
+def _recomputed(stage: str) -> str:
     return (
         f"The stage '{stage}' in the result folder was damaged, or changed since it was written; it was done anew. "
         "If nobody changed it, check the disk."
@@ -92,21 +92,21 @@ def _report_surface(run: Corrected, figures: dict[str, Any], warnings: list[str]
         )
 
 
-def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
-    lit, atlas = run.lit_diffuse(), run.surface().atlas
+def _report_lit_diffuse(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
+    lit_diffuse, atlas = run.lit_diffuse(), run.surface().atlas
     if run.read.blind:
         count, first = len(run.read.blind), run.read.blind[0]
         warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
-    if not lit.radiance[lit.seen].any():
+    if not lit_diffuse.radiance[lit_diffuse.seen].any():
         warnings.append("Every frame is black; nothing can be said of any albedo.")
-    found = run.observed().calibration
-    if found.calibrated.any():
-        exposure = np.log2(found.gain[found.calibrated].mean(1))
+    calibration = run.observed().calibration
+    if calibration.calibrated.any():
+        exposure = np.log2(calibration.gain[calibration.calibrated].mean(1))
         figures |= {
-            "calibrated_frames": int(found.calibrated.sum()),
+            "calibrated_frames": int(calibration.calibrated.sum()),
             "exposure_range_stops": float(np.ptp(exposure)),
-            "calibration_spread": float(found.spread),
-            "mean_white_balance": np.exp(np.log(found.gain[found.calibrated]).mean(0)).tolist(),
+            "calibration_spread": float(calibration.spread),
+            "mean_white_balance": np.exp(np.log(calibration.gain[calibration.calibrated]).mean(0)).tolist(),
         }
     poses = run.poses()
     if np.isfinite(poses.shift):
@@ -117,16 +117,18 @@ def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) ->
             f"{poses.moved.sum()} of {len(poses.moved)} were put right; turn off refine_poses to use them as read."
         )
     area = atlas.area.sum()
-    figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
-    figures["observations_median"] = float(np.median(lit.count[lit.seen])) if run.capture.frames else 0.0
+    figures["unseen_share"] = float(atlas.area[~lit_diffuse.seen].sum() / area)
+    figures["observations_median"] = (
+        float(np.median(lit_diffuse.count[lit_diffuse.seen])) if run.capture.frames else 0.0
+    )
     figures["lit_from"] = "frames" if run.capture.frames else "textures on the mesh"
-    seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
+    seen = np.bincount(atlas.object_id, lit_diffuse.seen, int(atlas.object_id.max()) + 1)
     unseen = [i for i in run.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
     if unseen:
         names = ", ".join(i.name for i in unseen[:5])
         more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
         warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
-    clipped = float(atlas.area[lit.tier == SATURATED].sum() / area)
+    clipped = float(atlas.area[lit_diffuse.tier == SATURATED].sum() / area)
     if clipped > 0:
         figures["clipped_share"] = clipped
         warnings.append(f"{clipped:.1%} of the surface is clipped in every frame that sees it; no albedo is had of it.")
@@ -135,12 +137,14 @@ def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) ->
 
 
 def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
-    shading, lit = run.shading(), run.lit_diffuse()
-    escaped = float(shading.escaped[lit.seen].mean())
+    shading, lit_diffuse = run.shading(), run.lit_diffuse()
+    escaped = float(shading.escaped[lit_diffuse.seen].mean())
     # Before the specular part is known; a clipped element has no quotient.
-    rho, valid = quotient(lit.radiance, shading.irradiance)
-    told = without_emitters(run.surface().atlas, lit.seen & (lit.tier != SATURATED), shading.emitters)
-    above = above_one(rho, told & valid)
+    rho, valid = quotient(lit_diffuse.radiance, shading.irradiance)
+    measurable = without_emitters(
+        run.surface().atlas, lit_diffuse.seen & (lit_diffuse.tier != SATURATED), shading.emitters
+    )
+    above = above_one(rho, measurable & valid)
     figures |= {
         "escaped_share": escaped,
         "albedo_above_one_share": above,
@@ -154,7 +158,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         sun = shading.sun
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
-    names = {one.object_id: one.name for one in run.capture.instances}
+    names = {instance.object_id: instance.name for instance in run.capture.instances}
     warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
     warnings += shading.notes
     if above > MISSING.alarm:
@@ -162,7 +166,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
             f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."
         )
-    figures["unlit_share"] = float((told & ~valid).sum() / max(lit.seen.sum(), 1))
+    figures["unlit_share"] = float((measurable & ~valid).sum() / max(lit_diffuse.seen.sum(), 1))
     if figures["unlit_share"] > 0.001:
         warnings.append(
             f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."

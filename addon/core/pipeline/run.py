@@ -48,7 +48,7 @@ def progress_of_run(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a run besides its settings.
+    """What is requested of a run besides its settings.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Asked:
         for stage in (self.until, self.from_stage):
             if stage is not None and stage not in RUN_STAGES:
                 raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
-        if self.block is not None and self.until not in [one.name for one in DECLARED if one.divided_by]:
+        if self.block is not None and self.until not in [stage.name for stage in DECLARED if stage.divided_by]:
             raise BadInputError(f"Stage '{self.until}' can't be divided into blocks; leave --block out.")
         check_path(out_folder)
         if out_folder.resolve() == capture_folder.resolve():
@@ -140,13 +140,13 @@ class Run:
     ):
         self.capture, self.folder, self._asked, self._started = capture, out_folder, asked, started
         self._settings, self._progress, self._versions = settings, progress, dict(versions)
-        known = {one.object_id for one in capture.instances} | objects_of(out_folder)
-        self._given = heeded(out_folder, known, asked.override, asked.heed_kept)
+        known_ids = {instance.object_id for instance in capture.instances} | objects_of(out_folder)
+        self._given = heeded(out_folder, known_ids, asked.override, asked.heed_kept)
         if asked.white:
             self._given = merge(self._given, Overrides(white=white_of(asked.white, capture)))
-        self._told = _look(capture, asked.reading) if capture.frames else []
+        self._warnings = _look(capture, asked.reading) if capture.frames else []
         if not asked.heed_kept and (out_folder / OVERRIDES).is_file():
-            self._told = [LEFT_OUT, *self._told]
+            self._warnings = [LEFT_OUT, *self._warnings]
 
     def __enter__(self) -> Run:
         self._store = Store(self.folder, shared=self._asked.block is not None)
@@ -156,7 +156,7 @@ class Run:
         self._store.close()
 
     def stages(self, unwrap: Unwrap) -> dict[str, Any]:
-        """Do the stages that are asked for, over an atlas by `unwrap`; returns the report of a run that ends there.
+        """Do the stages that are requested, over an atlas by `unwrap`; returns the report of a run that ends there.
 
         It is empty where all are, for `write` reports itself. What was written before stays untouched then.
 
@@ -200,7 +200,7 @@ class Run:
         recovery.store = store
         with told_in_a_sentence(self.folder):
             self._progress.stage(WRITE)
-            writing = time.monotonic()
+            started = time.monotonic()
             recovery.look_closer()
             # A stopped run must not leave the last one's among new images.
             for name in ("report.json", "scene.blend", ROOM):
@@ -217,7 +217,7 @@ class Run:
                 recovery.let_go()
                 warnings = scene(recovery, posed)
             self._progress.done()
-            figures = {"seconds": round(time.monotonic() - writing, 2), "stored": False}
+            figures = {"seconds": round(time.monotonic() - started, 2), "stored": False}
             report["stages"] |= {WRITE: figures | {"peak_memory_bytes": peak_memory()}}
             report = self._report(report, warnings)
             store.write_json("report.json", report)
@@ -225,7 +225,7 @@ class Run:
 
     def _report(self, report: dict[str, Any], warnings: tuple[str, ...] = ()) -> dict[str, Any]:
         """The recovery's report with what only the run knows."""
-        report["warnings"] += (*self._told, *warnings)
+        report["warnings"] += (*self._warnings, *warnings)
         report["versions"] = self._versions | package_versions()
         report["peak_memory_bytes"] = peak_memory()
         report["seconds"] = round(time.monotonic() - self._started, 2)
@@ -240,12 +240,12 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
     BadInputError
         The poses are surely read wrongly, and how they would be right is known.
     """
-    found = look(capture, read_pixels, search=not reading.convention)
-    if found.best is not None:
+    fit = look(capture, read_pixels, search=not reading.convention)
+    if fit.best is not None:
         raise BadInputError(
-            f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go on all the same."
+            f"Capture '{capture.root}': {fit.sentence()} Give that, or --convention {AS_READ} to go on all the same."
         )
-    return found.sentences()[found.fits :]
+    return fit.sentences()[fit.fits :]
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from ..light.mirrors import Mirror, known_mirror
 from ..light.openings import Openings, looked_out_by
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
-from ..light.sun import Sun, taken_out
+from ..light.sun import Sun, extract_sun
 from ..luminance import LUMINANCE
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
@@ -61,51 +61,63 @@ def find_shading(
     s = settings
 
     def mirrors(field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
-        found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed)
-        told = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
-        return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
+        mirrors_found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed)
+        known = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
+        return (
+            *mirrors_found,
+            *(
+                candidate
+                for candidate in known
+                if candidate.object_id not in {mirror.object_id for mirror in mirrors_found}
+            ),
+        )
 
-    lit = observed.lit_diffuse
+    lit_diffuse = observed.lit_diffuse
     if "shading" in s.published:
         return published_light.shade(
-            surface.mesh, surface.atlas, surface.scene, lit, observed.environment,
+            surface.mesh, surface.atlas, surface.scene, lit_diffuse, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    patches, guessed = Patches.none(), capture.mesh.whole
-    if guessed and not {"clipped-patches", "missing-light"} & set(s.without):
-        patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit)
+    patches, parts_guessed = Patches.none(), capture.mesh.whole
+    if parts_guessed and not {"clipped-patches", "missing-light"} & set(s.without):
+        patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit_diffuse)
         surface = patches.surface(surface)
-    if guessed and s.mirrors and "mirrors" not in s.without:
-        seen = LightField(
-            surface.mesh, surface.atlas, surface.scene, unseen_dark(lit), observed.environment, lookup=surface.lookup
+    if parts_guessed and s.mirrors and "mirrors" not in s.without:
+        field = LightField(
+            surface.mesh,
+            surface.atlas,
+            surface.scene,
+            unseen_dark(lit_diffuse),
+            observed.environment,
+            lookup=surface.lookup,
         )
-        glass = mirror_patches(seen, observed.samples)
-        patches, surface = Patches.together([patches, glass]), glass.surface(surface)
+        panes = mirror_patches(field, observed.samples)
+        patches, surface = Patches.together([patches, panes]), panes.surface(surface)
     capture = patches.capture(capture)
 
-    def shaded(lit: LitDiffuse, shining: Collection[int] = ()) -> Shading:
+    def shaded(lit_diffuse: LitDiffuse, shining: Collection[int] = ()) -> Shading:
         return shade(
-            surface, capture.instances, lit, observed.environment, s, progress=progress,
+            surface, capture.instances, lit_diffuse, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, shining=shining,
-            patches=patches.lamps if guessed else None, cameras=[frame.camera for frame in capture.frames],
+            patches=patches.lamps if parts_guessed else None, cameras=[frame.camera for frame in capture.frames],
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
-        found = shaded(lit)
+        shading = shaded(lit_diffuse)
     else:
-        found = shade_clipped(shaded, lit, surface.atlas, patches.lamps)
-    return with_patches_of(found, patches)
+        shading = shade_clipped(shaded, lit_diffuse, surface.atlas, patches.lamps)
+    return with_patches_of(shading, patches)
 
 
-def with_patches_of(found: Shading, patches: Patches) -> Shading:
-    """Light that was found with `patches` set apart: those that are no lamps or mirrors are of their objects again."""
-    mirrors = {one.object_id for one in found.mirrors}
-    kept, number = patches.kept(set(patches.objects) & (found.emitters | mirrors))
+def with_patches_of(shading: Shading, patches: Patches) -> Shading:
+    """A `Shading` found with `patches` set apart: those that are no lamps or mirrors go back to their objects."""
+    mirrors = {mirror.object_id for mirror in shading.mirrors}
+    chosen, number = patches.kept(set(patches.objects) & (shading.emitters | mirrors))
 
-    def told(found: Any) -> tuple:
-        return tuple(replace(one, object_id=number.get(one.object_id, one.object_id)) for one in found)
+    def renumbered(sources: Any) -> tuple:
+        return tuple(replace(source, object_id=number.get(source.object_id, source.object_id)) for source in sources)
 
-    return replace(found, lamps=told(found.lamps), mirrors=told(found.mirrors), patches=kept)
+    return replace(shading, lamps=renumbered(shading.lamps), mirrors=renumbered(shading.mirrors), patches=chosen)
 
 
 def lit_room(surface: Surface, shading: Shading) -> LightField:
@@ -140,12 +152,12 @@ def shade(
     Parameters
     ----------
     find_mirrors : callable, optional
-        Tells the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
+        Finds the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
         again with them.
     shining : collection of int
         Objects that frames show clipped, of which `lit_diffuse` holds nothing.
     patches : list of int, optional
-        Objects that were set apart as they were clipped; None where the capture tells of its objects.
+        Objects that were set apart as they were clipped; None where the capture names its objects.
     cameras : sequence of Camera
         Of the frames.
 
@@ -155,7 +167,7 @@ def shade(
         From `progress`.
     """
     mesh, atlas, without, seed = surface.mesh, surface.atlas, settings.without, settings.seed
-    how: Gathering = {
+    gathering: Gathering = {
         "finest": finest_spacing(atlas),
         "smooth": "lamp-noise" not in without,
         "threads": settings.threads,
@@ -164,14 +176,14 @@ def shade(
     find_mirrors = None if "mirrors" in without else find_mirrors
     tilted = np.zeros(len(atlas)) if "tilt-error" in without else turned_by_noise(mesh, atlas, surface.noise)
 
-    environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
+    environment, sun = (environment, None) if "seen-sun" in without else extract_sun(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
     dark = LightField(
         mesh, atlas, surface.scene, unseen_dark(lit_diffuse), environment, lookup=surface.lookup
     ).with_sun(sun)
     clean = lit_diffuse.seen & (lit_diffuse.tier == CLEAN)
     if "unseen-surfaces" not in without and clean.any():
-        dark = with_unseen_by_light(dark, clean, **how)
+        dark = with_unseen_by_light(dark, clean, **gathering)
     kinds = lamp_kinds(mesh, instances, surface.noise)
     field, light = with_all_light(dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without)
     solved = np.zeros(len(atlas), bool)
@@ -181,27 +193,27 @@ def shade(
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}
-    told = lit_diffuse.seen | solved | np.isin(atlas.object_id, list(emitters))
-    if not told.all() and "unseen-surfaces" not in without:
-        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, **how)
+    known = lit_diffuse.seen | solved | np.isin(atlas.object_id, list(emitters))
+    if not known.all() and "unseen-surfaces" not in without:
+        field, E, escaped = with_unseen_surfaces(field, known, lit_diffuse, instances, emitters, **gathering)
         give_back()
     else:
         E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
-    lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
-    E[lit], escaped[lit], points, unsure[lit] = irradiance(
-        field, lit, rays=settings.shading_rays,
+    indices, error = np.flatnonzero(known), np.zeros(len(atlas), np.float32)
+    E[indices], escaped[indices], points, error[indices] = irradiance(
+        field, indices, rays=settings.shading_rays,
         emitter_rays=0 if "emitter-rays" in without else settings.emitter_rays,
         portal_rays=0 if "portal-rays" in without else settings.portal_rays,
-        interpolate=settings.interpolate and "interpolation" not in without, progress=progress, **how,
+        interpolate=settings.interpolate and "interpolation" not in without, progress=progress, **gathering,
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
-    unsure = np.hypot(unsure, tilted)
+    error = np.hypot(error, tilted)
     # Near a crease the light of two sides is mixed.
     if "crease-error" not in without:
-        unsure = np.hypot(unsure, crease_error(mesh, atlas, atlas.texel_edge))
+        error = np.hypot(error, crease_error(mesh, atlas, atlas.texel_edge))
     notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(
-        E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun,
+        E, escaped, error, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun,
         field.openings,
     )  # fmt: skip
 
@@ -239,16 +251,16 @@ def with_all_light(
     real = atlas.area > 0
     unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
     unseen = [] if "unseen-lamps" in without else unseen
-    # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
+    # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
     light, sun = find_all_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:
-        own = atlas.elements_of(lamp.object_id)
+        elements = atlas.elements_of(lamp.object_id)
         # At its edges the surroundings are mixed in.
-        radiance[own[tier[own] != CLEAN] if lamp.seen else own] = lamp.radiance
+        radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
     field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
     return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light
 
@@ -265,7 +277,7 @@ def with_missing_light(
 ) -> tuple[LightField, Light, np.ndarray]:
     """The room with the light of clipped patches and openings, if it lacks light; else as it is.
 
-    Last, the elements that no frame saw of which it tells what they send ((n,) bool).
+    Last, the unseen elements for which it gives the radiance they send ((n,) bool).
 
     Parameters
     ----------
@@ -277,85 +289,95 @@ def with_missing_light(
     good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
     if not is_missing(field, good, seed):
         return field, light, np.zeros(len(field.atlas), bool)
-    told = told_of(patches, field.atlas, lit_diffuse)
-    bright = np.isin(field.atlas.object_id, [*told, *(one.object_id for one in field.mirrors)])
-    lit_over = dark.with_mirrors(field.mirrors)
-    unknown, believed = [one for one in patches if one not in told], good & ~bright
-    usual = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
-    windows, looks = looked_out_by(cameras, field.scene, field.environment, usual, *field.outer_box)
+    measured = told_of(patches, field.atlas, lit_diffuse)
+    bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
+    reflecting = dark.with_mirrors(field.mirrors)
+    unknown, reliable = [patch for patch in patches if patch not in measured], good & ~bright
+    median_luminance = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
+    windows, directions = looked_out_by(cameras, field.scene, field.environment, median_luminance, *field.outer_box)
     # What is seen through a crack is near, and says nothing of what lies in that direction.
-    lit_over = lit_over.with_light(lit_over.radiance, lit_over.environment.shown_in(looks))
-    found = find_missing_light(lit_over, believed, unknown, seed, windows)
-    lit, now = with_found_light(dark, field, light, lit_diffuse, found, told)
+    reflecting = reflecting.with_light(reflecting.radiance, reflecting.environment.shown_in(directions))
+    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
     if "sun" in without or dark.sun is not None:
-        return lit, now, found.shut
-    sun = find_patch_sun(dark, lit, lit_diffuse, patches, seed)
+        return lit_field, light_found, missing.shut
+    sun = find_patch_sun(dark, lit_field, lit_diffuse, patches, seed)
     if sun is None:
-        return lit, now, found.shut
-    dark, lit_over = dark.with_sun(sun), lit_over.with_sun(sun)
-    found = find_missing_light(lit_over, believed, unknown, seed, windows)
-    return *with_found_light(dark, field, light, lit_diffuse, found, told), found.shut
+        return lit_field, light_found, missing.shut
+    dark, reflecting = dark.with_sun(sun), reflecting.with_sun(sun)
+    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    return *with_found_light(dark, field, light, lit_diffuse, missing, measured), missing.shut
 
 
 def with_found_light(
-    dark: LightField, field: LightField, light: Light, lit_diffuse: LitDiffuse, found: MissingLight, told: list[int]
+    dark: LightField,
+    field: LightField,
+    light: Light,
+    lit_diffuse: LitDiffuse,
+    missing: MissingLight,
+    measured: list[int],
 ) -> tuple[LightField, Light]:
-    """The room with the light that was `found` to be missing; `told` are the patches whose radiance frames tell."""
+    """The room with the light found `missing`; `measured` are the patches whose radiance the frames show."""
     radiance = evened(dark)
-    for one, solved in found.radiance.items():
-        own = dark.atlas.object_id == one
-        radiance[own] = np.maximum(radiance[own], solved)
-    atlas, shut = dark.atlas, found.shut
-    radiance[shut] = found.openings.radiance[found.openings.behind(atlas.position[shut], atlas.normal[shut])]
+    for object_id, solved in missing.radiance.items():
+        of_object = dark.atlas.object_id == object_id
+        radiance[of_object] = np.maximum(radiance[of_object], solved)
+    atlas, closed = dark.atlas, missing.shut
+    radiance[closed] = missing.openings.radiance[missing.openings.behind(atlas.position[closed], atlas.normal[closed])]
     # What looked like a lamp for want of light may do so no more.
-    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*found.brighter, *told})
-    for lamp in seen:
-        own = dark.atlas.object_id == lamp.object_id
-        radiance[own & (lit_diffuse.tier != CLEAN)] = lamp.radiance
-    lamps = (*seen, *found.lamps)
+    seen_lamps = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*missing.brighter, *measured})
+    for lamp in seen_lamps:
+        of_object = dark.atlas.object_id == lamp.object_id
+        radiance[of_object & (lit_diffuse.tier != CLEAN)] = lamp.radiance
+    lamps = (*seen_lamps, *missing.lamps)
     middle = np.median(dark.atlas.position, 0)
     # What is bright is written as lamps where it lies (`Openings.panels`).
-    environment = found.openings.without_bright().filled(found.environment, middle)
+    environment = missing.openings.without_bright().filled(missing.environment, middle)
     field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
-    light = replace(light, lamps=lamps, environment=environment, notes=found.notes)
-    return field.with_openings(found.openings).with_sun(dark.sun), light
+    light = replace(light, lamps=lamps, environment=environment, notes=missing.notes)
+    return field.with_openings(missing.openings).with_sun(dark.sun), light
 
 
-def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def to_store(shading: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a `Shading`: arrays, and what JSON holds."""
-    arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "relative_error", "radiance")}
-    arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
-    if found.openings is not None:
-        arrays |= {f"openings_{one.name}": getattr(found.openings, one.name) for one in fields(Openings)}
-    arrays |= {f"patches_{one.name}": getattr(found.patches, one.name) for one in fields(Patches)}
+    arrays = {name: getattr(shading, name) for name in ("irradiance", "escaped", "relative_error", "radiance")}
+    arrays |= {"sky": shading.environment.radiance, "sky_seen": shading.environment.observations}
+    if shading.openings is not None:
+        arrays |= {f"openings_{field.name}": getattr(shading.openings, field.name) for field in fields(Openings)}
+    arrays |= {f"patches_{field.name}": getattr(shading.patches, field.name) for field in fields(Patches)}
     meta = {
-        "sun": found.sun and {k: np.asarray(v).tolist() for k, v in asdict(found.sun).items()},
-        "points": found.points,
-        "mirrors": [mirror.as_lists() for mirror in found.mirrors],
-        "notes": list(found.notes),
-        "lamps": [asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
+        "sun": shading.sun and {k: np.asarray(v).tolist() for k, v in asdict(shading.sun).items()},
+        "points": shading.points,
+        "mirrors": [mirror.as_lists() for mirror in shading.mirrors],
+        "notes": list(shading.notes),
+        "lamps": [asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in shading.lamps],
     }
     return arrays, meta
 
 
-def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
+def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
     """The inverse of `to_store`."""
     lamps = tuple(
-        Lamp(**(d | {"radiance": np.float32(d["radiance"]), "spread": d["spread"] and tuple(d["spread"])}))
-        for d in meta["lamps"]
+        Lamp(
+            **(
+                entry
+                | {"radiance": np.float32(entry["radiance"]), "spread": entry["spread"] and tuple(entry["spread"])}
+            )
+        )
+        for entry in meta["lamps"]
     )
-    mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
+    mirrors = tuple(Mirror.from_lists(entry) for entry in meta["mirrors"])
     return Shading(
-        a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
-        Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
+        arrays["irradiance"], arrays["escaped"], arrays["relative_error"], arrays["radiance"], lamps,
+        Environment(arrays["sky"], arrays["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         None if meta["sun"] is None else _sun(**meta["sun"]),
         Openings(
-            a["openings_low"], a["openings_size"], a["openings_radiance"], float(a["openings_share"]),
-            a["openings_windows"],
-        ) if "openings_low" in a else None,
-        Patches(*(a[f"patches_{one.name}"] for one in fields(Patches))),
+            arrays["openings_low"], arrays["openings_size"], arrays["openings_radiance"],
+            float(arrays["openings_share"]), arrays["openings_windows"],
+        ) if "openings_low" in arrays else None,
+        Patches(*(arrays[f"patches_{field.name}"] for field in fields(Patches))),
     )  # fmt: skip
 
 
-def _sun(direction: list[float], irradiance: list[float], **more: Any) -> Sun:
-    return Sun(np.array(direction, np.float32), np.array(irradiance, np.float32), **more)
+def _sun(direction: list[float], irradiance: list[float], **options: Any) -> Sun:
+    return Sun(np.array(direction, np.float32), np.array(irradiance, np.float32), **options)

@@ -15,15 +15,15 @@ def digest(module: Path, root: Path = CORE) -> str:
 
     It is the same wherever the same source lies, whatever its line ends are.
     """
-    found: set[Path] = set()
-    left = [module]
-    while left:
-        path = left.pop()
-        if path not in found:
-            found.add(path)
-            left += _imported(path, root)
+    modules: set[Path] = set()
+    pending = [module]
+    while pending:
+        path = pending.pop()
+        if path not in modules:
+            modules.add(path)
+            pending += _imported(path, root)
     result = hashlib.sha256()
-    for name, path in sorted((path.relative_to(root).as_posix(), path) for path in found):
+    for name, path in sorted((path.relative_to(root).as_posix(), path) for path in modules):
         result.update(f"{name}\0{_text(path)}\0".encode())
     return result.hexdigest()
 
@@ -36,9 +36,9 @@ def _text(path: Path) -> str:
 @functools.cache
 def _imported(path: Path, root: Path) -> tuple[Path, ...]:
     """The modules below `root` that one imports, and their packages."""
-    found = []
-    for dots, name, what in IMPORT.findall(_text(path)):
+    candidates = []
+    for dots, name, imported in IMPORT.findall(_text(path)):
         base = path.parents[len(dots) - 1].joinpath(*filter(None, name.split(".")))
-        names = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", what))
-        found += [base.with_suffix(".py"), base / "__init__.py", *(base / f"{one}.py" for one in names)]
-    return tuple(one for one in found if root in one.parents and one.is_file())
+        names = re.findall(r"\w+", re.sub(r" as \w+|#.*", "", imported))
+        candidates += [base.with_suffix(".py"), base / "__init__.py", *(base / f"{name}.py" for name in names)]
+    return tuple(candidate for candidate in candidates if root in candidate.parents and candidate.is_file())

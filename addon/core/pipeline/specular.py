@@ -58,7 +58,7 @@ class Specular:
     excess : (n, 3) float32
         What is to be added to E, as glossy things reflect more onto each element than their L_d says.
     hidden : (n,) bool
-        In every view the specular part is more than what is left: L_d tells of no albedo.
+        In every view the specular part is more than what remains: L_d says nothing of the albedo.
     """
 
     materials: tuple[ObjectMaterial, ...]
@@ -79,7 +79,7 @@ class Specular:
     @staticmethod
     def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
         """From the stage's arrays, and the descriptions as JSON has them."""
-        materials = tuple(from_json(one) for one in meta["materials"])
+        materials = tuple(from_json(entry) for entry in meta["materials"])
         return Specular(materials, arrays["specular"], arrays["excess"], arrays["hidden"])
 
 
@@ -134,25 +134,30 @@ def fit_specular(
     InterruptedRun
         From the room's progress.
     """
-    instances, field, given, how = room.instances, room.field, room.given, room.settings
-    without, refine = how.without, how.refine
+    instances, field, given, settings = room.instances, room.field, room.given, room.settings
+    without, refine = settings.without, settings.refine
     refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
-    maker, wanted = _asked(room, held)
-    told: dict[int, ObjectMaterial] = {}
-    if "specular" in how.published:
+    maker, wanted = _problems_and_objects(room, held)
+    target_lobes: dict[int, ObjectMaterial] = {}
+    if "specular" in settings.published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
-        told = fit_targets(others, room)
-        wanted = [i for i in wanted if i not in told]
-    found = look_at(room, maker, wanted, looked)
-    chosen = choose_models(room, found)
+        target_lobes = fit_targets(others, room)
+        wanted = [i for i in wanted if i not in target_lobes]
+    looks = look_at(room, maker, wanted, looked)
+    chosen = choose_models(room, looks)
 
-    kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
+    held_materials = (
+        {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
+    )
     by_id = {
-        i.object_id: kept.get(i.object_id) or told.get(i.object_id) or _describe(i, room, chosen) for i in instances
+        instance.object_id: held_materials.get(instance.object_id)
+        or target_lobes.get(instance.object_id)
+        or _describe(instance, room, chosen)
+        for instance in instances
     }
-    _same_as(by_id, given, set(kept))
+    _copy_same_materials(by_id, given, set(held_materials))
     materials = tuple(by_id.values())
-    del chosen, found  # megabytes of observations for each object
+    del chosen, looks  # megabytes of observations for each object
     give_back()
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
@@ -162,17 +167,17 @@ def fit_specular(
         excess = held.found.excess
         hidden = held.found.hidden & ~np.isin(field.atlas.object_id, list(held.only))
     if refine:
-        apart = [m for m in materials if m.object_id not in kept]
-        _without_backgrounds(specular, apart, room, maker)
+        fitted = [m for m in materials if m.object_id not in held_materials]
+        _without_backgrounds(specular, fitted, room, maker)
         if pictures is not None:
-            hidden |= _remove(specular, apart, room, pictures)
+            hidden |= _remove(specular, fitted, room, pictures)
     give_back()
     if refine > 1 and held is None:
-        seen = np.flatnonzero(room.lit_diffuse.seen)
-        sent = Excess(field, materials, specular, how.seed)
-        excess[seen] = glossy_light(
-            sent, seen, room.irradiance[seen], threads=how.threads, seed=how.seed, progress=room.progress,
-            share=(0.85, 1.0), without=without,
+        seen_elements = np.flatnonzero(room.lit_diffuse.seen)
+        emitted = Excess(field, materials, specular, settings.seed)
+        excess[seen_elements] = glossy_light(
+            emitted, seen_elements, room.irradiance[seen_elements], threads=settings.threads, seed=settings.seed,
+            progress=room.progress, share=(0.85, 1.0), without=without,
         )  # fmt: skip
     return Specular(materials, specular, excess, hidden)
 
@@ -190,12 +195,12 @@ def look_at_block(room: Room, block: tuple[int, int]) -> dict[int, Looked]:
     InterruptedRun
         From the room's progress.
     """
-    maker, wanted = _asked(room, None)
+    maker, wanted = _problems_and_objects(room, None)
     return look_at(room, maker, wanted[block[0] - 1 :: block[1]])
 
 
-def _asked(room: Room, held: Held | None) -> tuple[Problems, list[int]]:
-    """What makes objects' problems, and the objects that a model is to be chosen for."""
+def _problems_and_objects(room: Room, held: Held | None) -> tuple[Problems, list[int]]:
+    """The builder of objects' fitting problems, and the objects that a model is to be chosen for."""
     found_before = {lamp.object_id for lamp in room.lamps} | {mirror.object_id for mirror in room.field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(room.field, room.samples, threads=1, seed=room.settings.seed, without=room.settings.without)
@@ -206,51 +211,55 @@ def _wanted(
     instances: tuple[Instance, ...], found_before: set[int], given: Mapping[int, Given], held: Held | None
 ) -> list[int]:
     """Objects that a model is to be chosen for. What is given goes before what the shading stage found."""
-    taken = {i for i, one in given.items() if one.same_as is not None}
-    settled = {i for i in found_before if i not in given} | taken
-    wanted = [i.object_id for i in instances if i.object_id not in settled]
+    taken = {i for i, entry in given.items() if entry.same_as is not None}
+    excluded = {i for i in found_before if i not in given} | taken
+    wanted = [i.object_id for i in instances if i.object_id not in excluded]
     if held is None:
         return wanted
-    # Where nothing is given of an object, others of its class have their say.
-    alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
+    # Where nothing is given of an object, others of its class count, too.
+    classes = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
     class_of = class_names(instances)
-    return [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
+    return [i for i in wanted if i in held.only or i not in given and class_of[i] in classes]
 
 
-def _describe(i: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
+def _describe(instance: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
     """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
-    field, given, number = room.field, room.given, i.object_id
-    own, choice = field.atlas.elements_of(number), chosen.choices.get(number)
+    field, given, number = room.field, room.given, instance.object_id
+    elements, choice = field.atlas.elements_of(number), chosen.choices.get(number)
 
     def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
-        albedo, why = None, ""
+        albedo, reason = None, ""
         if "unlit-lamps" not in room.settings.without:
-            told = room.lit_diffuse.seen & ~np.isin(field.atlas.object_id, [one.object_id for one in room.lamps])
-            albedo, why = unlit(i, field, room.irradiance, told, room.settings.seed)
-        return lamp_material(i, radiance, room.irradiance[own], " ".join(filter(None, (note, why))), albedo)
+            reflecting = room.lit_diffuse.seen & ~np.isin(
+                field.atlas.object_id, [lamp.object_id for lamp in room.lamps]
+            )
+            albedo, reason = unlit(instance, field, room.irradiance, reflecting, room.settings.seed)
+        return lamp_material(
+            instance, radiance, room.irradiance[elements], " ".join(filter(None, (note, reason))), albedo
+        )
 
     if choice is not None and choice.model.gives_light:
-        seen = np.median(field.radiance[own], 0) if len(own) else np.zeros(3)
-        return lamp(seen, given_note(given[number]))
+        median = np.median(field.radiance[elements], 0) if len(elements) else np.zeros(3)
+        return lamp(median, given_note(given[number]))
     if choice is not None:
-        target, sure = chosen.targets[number], chosen.intervals[number]
+        target, interval = chosen.targets[number], chosen.intervals[number]
         name = room.frame_names[target] if target >= 0 else None
-        found = described(i, choice, chosen.problems.get(number), name, sure)
-        return as_given(found, given[number], choice, sure) if number in given else found
-    solved = None if number in given else next((one for one in room.lamps if one.object_id == number), None)
-    if solved is not None:
-        return lamp(solved.radiance, solved.note(room.names))
-    mirror = next((one for one in field.mirrors if one.object_id == number), None)
+        material = described(instance, choice, chosen.problems.get(number), name, interval)
+        return as_given(material, given[number], choice, interval) if number in given else material
+    solved_lamp = None if number in given else next((lamp for lamp in room.lamps if lamp.object_id == number), None)
+    if solved_lamp is not None:
+        return lamp(solved_lamp.radiance, solved_lamp.note(room.names))
+    mirror = next((mirror for mirror in field.mirrors if mirror.object_id == number), None)
     if mirror is not None and number not in given:
-        seen = int((field.atlas.object_id[room.samples.element] == number).sum())
-        return flat_mirror(i, mirror, seen)
-    return ObjectMaterial(number, i.class_name, LAMBERTIAN)  # the same as another, which is described first
+        observations = int((field.atlas.object_id[room.samples.element] == number).sum())
+        return flat_mirror(instance, mirror, observations)
+    return ObjectMaterial(number, instance.class_name, LAMBERTIAN)  # the same as another, which is described first
 
 
-def _same_as(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], kept: set[int]) -> None:
+def _copy_same_materials(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], skipped: set[int]) -> None:
     """Give objects that are given as the same as another that one's description."""
     for i in by_id:
-        if i not in kept and (source := given.get(i, NOTHING).same_as) is not None:
+        if i not in skipped and (source := given.get(i, NOTHING).same_as) is not None:
             while (further := given.get(source, NOTHING).same_as) is not None:
                 source = further
             by_id[i] = same_material(by_id[source], by_id[i])
@@ -258,18 +267,24 @@ def _same_as(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], kept:
 
 def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, pictures: Pictures) -> np.ndarray:
     """Put the specular part of glossy things' L_d into `specular`, (n, 3); where it hides the rest, (n,) bool."""
-    glossy, field, samples, how = [m for m in materials if m.model.layered], room.field, room.samples, room.settings
-    own = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
-    looking = np.unique(samples.frame[own[samples.element]])
-    if not len(looking):
-        return np.zeros(len(own), bool)
-    found = without_specular(
-        SpecularPart(field, glossy, how.seed), field, room.lit_diffuse, own,
-        [pictures.frames[i] for i in looking], pictures.read, median=how.median, seed=how.seed, threads=how.threads,
-        folder=pictures.folder, groups=pictures.groups, progress=Rounds(room.progress, 0.7, 1.0),
+    glossy, field, samples, settings = (
+        [m for m in materials if m.model.layered],
+        room.field,
+        room.samples,
+        room.settings,
+    )
+    glossy_mask = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
+    frames_showing = np.unique(samples.frame[glossy_mask[samples.element]])
+    if not len(frames_showing):
+        return np.zeros(len(glossy_mask), bool)
+    separated = without_specular(
+        SpecularPart(field, glossy, settings.seed), field, room.lit_diffuse, glossy_mask,
+        [pictures.frames[i] for i in frames_showing], pictures.read, median=settings.median, seed=settings.seed,
+        threads=settings.threads, folder=pictures.folder, groups=pictures.groups,
+        progress=Rounds(room.progress, 0.7, 1.0),
     )  # fmt: skip
-    specular[own] = found.specular[own]
-    return found.hidden
+    specular[glossy_mask] = separated.specular[glossy_mask]
+    return separated.hidden
 
 
 def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems) -> None:
@@ -279,21 +294,21 @@ def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
         return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
 
-    for own, part in ordered_map(separate, glass, room.settings.threads):
-        specular[own] = part
+    for elements, part in ordered_map(separate, glass, room.settings.threads):
+        specular[elements] = part
 
 
 def _without_background(
     material: ObjectMaterial, field: LightField, seen: np.ndarray, maker: Problems, samples: Samples
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
-    own = field.atlas.elements_of(material.object_id)
+    elements = field.atlas.elements_of(material.object_id)
     index = maker.pick(material.object_id, LEVELS.sample, FIT.views, least=1, seed=2)
     if not len(index):
-        return own, np.zeros((len(own), 3), np.float32)
+        return elements, np.zeros((len(elements), 3), np.float32)
     behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)
-    index, passed = index[behind.known], np.float32(material.transmission) * behind.radiance[behind.known]
+    index, transmitted = index[behind.known], np.float32(material.transmission) * behind.radiance[behind.known]
     if not len(index):
-        return own, np.zeros((len(own), 3), np.float32)
-    element, part = specular_in_median(samples, index, passed)
-    return own, spread_over_object(field.atlas, own, element, part)
+        return elements, np.zeros((len(elements), 3), np.float32)
+    element, part = specular_in_median(samples, index, transmitted)
+    return elements, spread_over_object(field.atlas, elements, element, part)

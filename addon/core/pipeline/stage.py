@@ -40,27 +40,31 @@ class Stage:
     @property
     def after(self) -> frozenset[str]:
         """Names of all stages that bear on it, its own included."""
-        return frozenset({self.name}.union(*(one.after for one in self.takes)))
+        return frozenset({self.name}.union(*(stage.after for stage in self.takes)))
 
-    def settings(self, asked: Settings) -> Settings:
+    def settings(self, requested: Settings) -> Settings:
         """Settings as the stage sees them: what it does not declare has its default, so that no result rests on it."""
-        heeded = {name: getattr(asked, name) for name in self.heeds}
-        without = tuple(name for name in asked.without if stage_of(name) in self.after)
-        return Settings(**heeded, without=without, threads=asked.threads)
+        declared = {name: getattr(requested, name) for name in self.heeds}
+        without = tuple(name for name in requested.without if stage_of(name) in self.after)
+        return Settings(**declared, without=without, threads=requested.threads)
 
-    def key(self, asked: Settings, before: dict[str, str], *more: Any) -> str:
+    def key(self, settings: Settings, previous: dict[str, str], *more: Any) -> str:
         """The key of its result.
 
         Parameters
         ----------
-        asked : Settings
-        before : dict of str
+        settings : Settings
+        previous : dict of str
             Keys of the stages that it takes, by name.
         more
             What else its result depends on.
         """
-        heeded = {name: getattr(asked, name) for name in self.heeds}
-        taken = [before[one.name] for one in self.takes]
-        others = tuple((one.name, one.origin or of_thing(one.run)) for one in following(self.name, asked.without))
-        more += (others,) if others else ()
-        return key(self.name, digest(self.source), taken, heeded, left_out_of(self.name, asked.without), *more)
+        declared = {name: getattr(settings, name) for name in self.heeds}
+        previous_keys = [previous[stage.name] for stage in self.takes]
+        packages = tuple(
+            (item.name, item.origin or of_thing(item.run)) for item in following(self.name, settings.without)
+        )
+        more += (packages,) if packages else ()
+        return key(
+            self.name, digest(self.source), previous_keys, declared, left_out_of(self.name, settings.without), *more
+        )

@@ -1,4 +1,4 @@
-"""The stages in their order: each is computed when it is first asked for, or taken from the result folder."""
+"""The stages in their order: each is computed when it is first needed, or taken from the result folder."""
 
 import time
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
 from ..results.values import packed, unpacked
-from ..scene.closed_mesh import opened
+from ..scene.closed_mesh import without_closing
 from ..scene.frame_choice import with_frames_that_add
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
@@ -47,14 +47,14 @@ from .stage import Stage
 STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
 """Those that are stored, in their order."""
 ELEMENT_BYTES: Block[int] = 300
-"""At least, that the stages after the surface take for each element: in three rooms 400 to 500, with all besides."""
+"""Lower bound of what the stages after the surface take for each element: in three rooms 400 to 500 in all."""
 Arrays = dict[str, np.ndarray]
 Stored = tuple[Arrays, dict[str, Any]]
 T = TypeVar("T")
 
 
 def code() -> str:
-    """16 hex digits that tell the source of the stages from any other."""
+    """16 hex digits that identify the source of the stages."""
     return key(*(digest(stage.source) for stage in STAGES))[:16]
 
 
@@ -77,7 +77,7 @@ class Stages:
     ----------
     capture : Capture
         As read, without frames that add nothing; with the lamps set apart that were found in other objects, once
-        `shading` was asked for.
+        `shading` was called.
     done : dict
         Values of the stages so far.
     log : dict
@@ -97,19 +97,19 @@ class Stages:
     ):
         check(settings.without)
         if "close-holes" in settings.without:
-            capture = opened(capture)
-        capture = self._taken(capture, settings)
+            capture = without_closing(capture)
+        capture = self._with_chosen_frames(capture, settings)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._as_read = capture
         self.overrides = overrides
         self.read = FrameReader(len(capture.frames))
-        self._near = surface.taken_in(capture)
+        self._centred = surface.centred(capture)
         self._unwrap = unwrap
         self.done: dict[str, Any] = {}
         self.log: dict[str, dict[str, Any]] = {}
 
-    def _taken(self, capture: Capture, settings: Settings) -> Capture:
-        """A capture with the frames that are looked at."""
+    def _with_chosen_frames(self, capture: Capture, settings: Settings) -> Capture:
+        """A capture with the frames that are used."""
         if "frame-choice" in settings.without or "lit_diffuse" in settings.published:
             return capture
         return with_frames_that_add(capture, settings.threads)
@@ -117,7 +117,7 @@ class Stages:
     @property
     def frames(self) -> tuple[Frame, ...]:
         """The capture's, in the coordinates that the stages work in, where they were found to be."""
-        return self.observed().of(self._near.frames)
+        return self.observed().of(self._centred.frames)
 
     @cached_property
     def keys(self) -> dict[str, str]:
@@ -130,30 +130,30 @@ class Stages:
         for stage in STAGES:
             given: tuple[Any, ...] = ()
             if stage is specular.STAGE:
-                brdfs = {one.brdf for one in overrides.lobes().values() if one.brdf is not None}
+                brdfs = {lobe.brdf for lobe in overrides.lobes().values() if lobe.brdf is not None}
                 given = (*overrides.lobes_key(), *sorted(filter(None, map(brdf_origin, brdfs))))
             keys[stage.name] = stage.key(self.settings, keys, *given) if stage.takes else self._first_key(stage)
         return keys
 
     def _first_key(self, stage: Stage) -> str:
-        others = tuple(filter(None, (readers.origin(self._as_read.format), self._laid_out_by)))
-        return stage.key(self.settings, {}, fingerprint(self._as_read), *others)
+        origins = tuple(filter(None, (readers.origin(self._as_read.format), self._laid_out_by)))
+        return stage.key(self.settings, {}, fingerprint(self._as_read), *origins)
 
     @cached_property
     def _laid_out_by(self) -> str:
-        """What lays out the atlas; where that is not told, as what is stored is only looked at: what did."""
+        """What lays out the atlas; what did, where that is not given as stored results are only read."""
         if self._unwrap is not None:
             return surface.laid_out_by(self._unwrap)
         return str(self.store.stored_meta(surface.STAGE.name).get("unwrap", ""))
 
     @property
     def run_key(self) -> str:
-        """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
-        told: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
-        told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
-        told += () if self.settings.texture_fill else ("no texture fill",)
-        told += left_out_of(WRITE, self.settings.without)
-        return key("run", self.keys[specular.STAGE.name], *told)[:16]
+        """16 hex digits that are the same where a capture and all that was requested are, and differ otherwise."""
+        parts: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
+        parts += () if self.settings.atlas == ROOM else (self.settings.atlas,)
+        parts += () if self.settings.texture_fill else ("no texture fill",)
+        parts += left_out_of(WRITE, self.settings.without)
+        return key("run", self.keys[specular.STAGE.name], *parts)[:16]
 
     def _stage(
         self,
@@ -185,13 +185,13 @@ class Stages:
     def surface(self) -> Surface:
         """Surface elements over the room; around the origin where the room lies far from it.
 
-        Once `shading` was asked for, this and the capture have the lamps set apart that it found in other objects.
+        Once `shading` was called, this and the capture have the lamps set apart that it found in other objects.
         """
-        capture = self._near
+        capture = self._centred
         return self._stage(
             surface.STAGE,
             lambda settings: surface.make_surface(capture, self._needed_unwrap(), settings),
-            lambda found: surface.to_store(found, capture.mesh, self._laid_out_by),
+            lambda result: surface.to_store(result, capture.mesh, self._laid_out_by),
             lambda arrays, meta: surface.from_store(arrays, meta, capture.mesh),
         )
 
@@ -213,12 +213,12 @@ class Stages:
 
         A sheet's second side is a little apart from the first.
         """
-        mesh, before = self.surface().mesh, self._near.mesh.vertices
+        mesh, before = self.surface().mesh, self._centred.mesh.vertices
         moved = mesh.vertices[: len(before)] - before  # by itself, so that what did not move is exact
         return laid_apart(mesh, self.capture.mesh.vertices + moved)
 
     def written_mesh(self) -> Mesh:
-        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in the planes that what they show tells."""
+        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in planes that follow from what they show."""
         mesh = self.room_mesh()
         if not self.surface().noise:
             return mesh
@@ -227,21 +227,21 @@ class Stages:
     def room_poses(self) -> Poses:
         """Where the frames were found to be, in the capture's coordinates."""
         poses = self.poses().camera_to_world.copy()
-        for pose, was, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
-            pose[:3, 3] += was.camera.centre - near.camera.centre
+        for pose, original, centred in zip(poses, self.capture.frames, self._centred.frames, strict=True):
+            pose[:3, 3] += original.camera.centre - centred.camera.centre
         return replace(self.poses(), camera_to_world=poses)
 
     def observed(self) -> Observed:
         """What the frames show."""
-        room, cameras = self.surface(), [frame.camera for frame in self._near.frames]
+        room, cameras = self.surface(), [frame.camera for frame in self._centred.frames]
 
         def observe(settings: Settings) -> Observed:
             needs = ELEMENT_BYTES * len(room.atlas) + bytes_of_frame(cameras)
-            BUDGET.ask(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
+            BUDGET.require(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
             if cameras and settings.median == "exact":
-                frames.ask_for_disk(room, self._near.frames, self.store.folder)
+                frames.check_disk_space(room, self._centred.frames, self.store.folder)
             passes = frames.Passes(room, self.read, settings, self.store.folder)
-            return frames.observe(passes, self._near, self.progress)
+            return frames.observe(passes, self._centred, self.progress)
 
         def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
             self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))
@@ -250,7 +250,7 @@ class Stages:
         return self._stage(
             frames.STAGE,
             observe,
-            lambda found: (found.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
+            lambda observed: (observed.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
             from_store,
         )
 
@@ -273,31 +273,31 @@ class Stages:
     def shading(self) -> Shading:
         """Lamps and irradiance."""
         room, observed, first = self.surface(), self.observed(), shading.STAGE.name not in self.done
-        found = self._stage(
+        result = self._stage(
             shading.STAGE,
-            lambda settings: shading.find_shading(self._near, room, observed, settings, self.progress),
+            lambda settings: shading.find_shading(self._centred, room, observed, settings, self.progress),
             shading.to_store,
             shading.from_store,
         )
-        if first and len(found.patches):
-            self.done[surface.STAGE.name] = found.patches.surface(room)
-            self.capture, self._near = found.patches.capture(self.capture), found.patches.capture(self._near)
-        return found
+        if first and len(result.patches):
+            self.done[surface.STAGE.name] = result.patches.surface(room)
+            self.capture, self._centred = result.patches.capture(self.capture), result.patches.capture(self._centred)
+        return result
 
     @cached_property
     def field(self) -> LightField:
         """The room as a light source, with all that was found of its light."""
-        found = self.shading()
-        return shading.lit_room(self.surface(), found)
+        light = self.shading()
+        return shading.lit_room(self.surface(), light)
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
         self.shading()
-        found = self._stage(
-            specular.STAGE, self.fitted, lambda found: found.to_store(self.overrides), Specular.from_store
+        result = self._stage(
+            specular.STAGE, self.fitted, lambda result: result.to_store(self.overrides), Specular.from_store
         )
         self.store.drop(self.store.parts(specular.STAGE.name))  # they are in it
-        return found
+        return result
 
     def specular_block(self, block: tuple[int, int]) -> None:
         """Store what is found of some of the objects, which `specular` begins with: the I-th of N parts, I from 1."""
@@ -307,19 +307,19 @@ class Stages:
         if self.store.stored_key(name) == key:
             return
         self.progress.stage(specular.STAGE.name)
-        found = look_at_block(self._room(settings), block)
+        looked = look_at_block(self._room(settings), block)
         arrays: Arrays = {}
-        self.store.save(name, key, arrays, {"looked": packed(found, arrays)})
+        self.store.save(name, key, arrays, {"looked": packed(looked, arrays)})
         self.progress.done()
 
-    def _looked(self) -> dict[int, Looked]:
+    def _stored_looks(self) -> dict[int, Looked]:
         """What blocks of objects have stored."""
-        found: dict[int, Looked] = {}
+        looked: dict[int, Looked] = {}
         for name in self.store.parts(specular.STAGE.name):
             arrays = self.store.load(name, self.keys[specular.STAGE.name])
             if arrays is not None:
-                found |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
-        return found
+                looked |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
+        return looked
 
     def _room(self, settings: Settings) -> Room:
         light, names = self.shading(), [frame.name for frame in self.capture.frames]
@@ -332,10 +332,10 @@ class Stages:
         """The specular stage as it is computed, of all objects or with some `held`."""
         room = self._room(settings)
         pictures = Pictures(self.frames, self.read, self.store.folder, self.surface().groups)
-        return fit_specular(room, pictures if room.frame_names else None, held, None if held else self._looked())
+        return fit_specular(room, pictures if room.frame_names else None, held, None if held else self._stored_looks())
 
     @cached_property
     def median_radiance(self) -> float:
         """Median of L_d over all that was seen: what a picture's exposure is set by."""
-        lit = self.lit_diffuse()
-        return float(np.median(lit.radiance[lit.seen]))
+        lit_diffuse = self.lit_diffuse()
+        return float(np.median(lit_diffuse.radiance[lit_diffuse.seen]))

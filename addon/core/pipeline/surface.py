@@ -15,7 +15,7 @@ from ..lit_diffuse.from_picture import texel_edge
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
-from ..scene.closed_mesh import as_scanned, settled
+from ..scene.closed_mesh import as_scanned, with_aligned_closing
 from ..scene.elements import Elements
 from ..scene.model import Capture, Mesh
 from ..scene.stored_light import LitTexture
@@ -31,11 +31,11 @@ COARSE: Unit[float] = 1e-6
 """Step of float32, as a share of the room's diagonal, from which on the room is moved."""
 
 
-def taken_in(capture: Capture) -> Capture:
+def centred(capture: Capture) -> Capture:
     """A capture as the stages take it: around the origin, if float32 is coarse where it lies; else as it is.
 
-    In a national grid's coordinates a room lies thousands of kilometres off, where float32 tells no two of its walls
-    apart. Poses and vertices are double as they are read, so nothing is lost where they are moved before rays, elements
+    In a national grid's coordinates a room lies thousands of kilometres off, where float32 can't distinguish two of its
+    walls. Poses and vertices are double as they are read, so nothing is lost where they are moved before rays, elements
     and trees round them.
     """
     used = capture.mesh.vertices[capture.mesh.triangles.ravel()]
@@ -60,11 +60,11 @@ def laid_out_by(unwrap: Unwrap) -> str:
         unwrap = unwrap.func
     module = sys.modules[unwrap.__module__]
     name = f"{module.__name__.removeprefix(OWN)}.{getattr(unwrap, '__qualname__', type(unwrap).__qualname__)}"
-    of = of_thing(unwrap)
-    if not of and module.__file__ is not None:
-        of = digest(Path(module.__file__), CORE.parent)[:16]
+    origin = of_thing(unwrap)
+    if not origin and module.__file__ is not None:
+        origin = digest(Path(module.__file__), CORE.parent)[:16]
     library = version("xatlas") if unwrap is by_xatlas and find_spec("xatlas") else ""
-    return " ".join(filter(None, (name, of, library)))
+    return " ".join(filter(None, (name, origin, library)))
 
 
 def denoised(mesh: Mesh, settings: Settings) -> tuple[Mesh, float]:
@@ -73,11 +73,11 @@ def denoised(mesh: Mesh, settings: Settings) -> tuple[Mesh, float]:
         return without_noise(mesh, settings.without)
     scanned, noise = without_noise(as_scanned(mesh), settings.without)
     vertices = np.concatenate([scanned.vertices, mesh.vertices[len(scanned.vertices) :]])
-    return settled(replace(mesh, vertices=vertices)), noise
+    return with_aligned_closing(replace(mesh, vertices=vertices)), noise
 
 
 def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surface:
-    """Lay surface elements out over the mesh of a capture `taken_in`. Raises `BadInputError`: no camera looks at it."""
+    """Lay surface elements out over the mesh of a capture `centred`. Raises `BadInputError`: no camera looks at it."""
     noisy = settings.denoise_mesh and "mesh-denoising" not in settings.without
     mesh, noise = denoised(capture.mesh, settings) if noisy else (capture.mesh, 0.0)
     texel = settings.texel_size
@@ -85,20 +85,20 @@ def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surfac
         edge = texel_edge(mesh, mesh.lit) if isinstance(mesh.lit, LitTexture) else face_edge(mesh)
         texel = texel or edge / settings.detail
     cameras, two_sides = [frame.camera for frame in capture.frames], "two-sides" not in settings.without
-    found = build_surface(
+    surface = build_surface(
         mesh, cameras, unwrap, texel, settings.detail, settings.atlas_size, two_sides,
         "coarse-unseen" not in settings.without, settings.threads,
     )  # fmt: skip
-    return replace(found, noise=noise)
+    return replace(surface, noise=noise)
 
 
-def to_store(found: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def to_store(surface: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a surface: arrays, and what JSON holds. Of the captured mesh it holds what is different."""
-    arrays = {"uv": found.uv, "sign": found.sign, "backs": found.backs}
-    if found.noise:
-        arrays["vertices"] = found.mesh.vertices[: len(captured.vertices)]
-    arrays |= {name: getattr(found.atlas, name) for name in Elements._fields}
-    meta = {"size": found.atlas.size, "noise": found.noise, "texel_size": found.texel_size, "unwrap": laid_out}
+    arrays = {"uv": surface.uv, "sign": surface.sign, "backs": surface.backs}
+    if surface.noise:
+        arrays["vertices"] = surface.mesh.vertices[: len(captured.vertices)]
+    arrays |= {name: getattr(surface.atlas, name) for name in Elements._fields}
+    meta = {"size": surface.atlas.size, "noise": surface.noise, "texel_size": surface.texel_size, "unwrap": laid_out}
     return arrays, meta
 
 
@@ -106,6 +106,6 @@ def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Me
     """The inverse of `to_store`."""
     mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
     mesh = with_backs(mesh, arrays["backs"])
-    known = Elements(**{name: arrays[name] for name in Elements._fields})
+    elements = Elements(**{name: arrays[name] for name in Elements._fields})
     size, texel, noise = int(meta["size"]), float(meta["texel_size"]), float(meta["noise"])
-    return from_uv(mesh, arrays["sign"], arrays["uv"], size, texel, known, noise)
+    return from_uv(mesh, arrays["sign"], arrays["uv"], size, texel, elements, noise)

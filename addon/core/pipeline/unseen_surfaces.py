@@ -24,23 +24,23 @@ ROUGH: RayCounts = {"rays": 64, "emitter_rays": 4, "portal_rays": 8}
 
 def with_unseen_surfaces(
     field: LightField,
-    told: np.ndarray,
+    known: np.ndarray,
     lit_diffuse: LitDiffuse,
     instances: tuple[Instance, ...],
     emitters: set[int],
-    **how: Unpack[Gathering],
+    **gathering: Unpack[Gathering],
 ) -> tuple[LightField, np.ndarray, np.ndarray]:
-    """The room with what the elements that are not `told` send.
+    """The room with what the elements that are not `known` send.
 
     Parameters
     ----------
     field : LightField
         With all of its light.
-    told : (n,) bool
+    known : (n,) bool
         Elements whose radiance is known; some are not.
     emitters : set of int
         Objects that are lamps.
-    how
+    gathering
         Those of `irradiance`.
 
     Returns
@@ -49,20 +49,20 @@ def with_unseen_surfaces(
     E : (n, 3) float32
         Rough, everywhere.
     escaped : (n,) float32
-        Share of the rays that left the mesh, where not `told`.
+        Share of the rays that left the mesh, where not `known`.
     """
-    atlas, lit, dark = field.atlas, np.flatnonzero(told), np.flatnonzero(~told)
+    atlas, known_elements, unknown_elements = field.atlas, np.flatnonzero(known), np.flatnonzero(~known)
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
-    E[lit], _ = _rough(field, lit, **how)
-    E[dark], escaped[dark] = _rough(field, dark, **how)
+    E[known_elements], _ = _rough(field, known_elements, **gathering)
+    E[unknown_elements], escaped[unknown_elements] = _rough(field, unknown_elements, **gathering)
     rho, valid = quotient(lit_diffuse.radiance, E)
     guess = fill(atlas, rho, valid, class_names(instances), emitters).rho
     radiance = field.radiance.copy()
-    radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
+    radiance[unknown_elements] = guess[unknown_elements] * E[unknown_elements] / np.float32(np.pi)
     return field.with_light(radiance), E, escaped
 
 
-def with_unseen_by_light(field: LightField, good: np.ndarray, **how: Unpack[Gathering]) -> LightField:
+def with_unseen_by_light(field: LightField, good: np.ndarray, **gathering: Unpack[Gathering]) -> LightField:
     """The field with what unseen elements likely send (`LightField.unseen`), in proportion to the light they get.
 
     The underside of a cupboard gets far less than its doors. Counted as bright as these, it would light the worktop
@@ -73,32 +73,32 @@ def with_unseen_by_light(field: LightField, good: np.ndarray, **how: Unpack[Gath
     field : LightField
         Dark where no frame looked, without lamps.
     good : (n,) bool
-        Elements whose L_d is to be believed.
+        Elements whose L_d is reliable.
     """
-    even, atlas, seed = evened(field), field.atlas, how["seed"]
-    lit = pick(field, good, seed, LEVELS.sample)
-    looks = max(ROUGH["rays"] * LEVELS.sample // len(lit), 1)
-    start = np.repeat(field.scene.off_surface(atlas.position[lit], atlas.normal[lit]), looks, 0)
-    way, _ = turned(cosine_patterns(looks, seed), atlas.normal[lit], np.random.default_rng(seed))
-    met = np.unique(field.elements(field.scene.intersect(start, way.reshape(-1, 3))))
-    dark = met[(met >= 0) & even[met].any(1) & ~field.radiance[met].any(1)]
+    even, atlas, seed = evened(field), field.atlas, gathering["seed"]
+    sample = pick(field, good, seed, LEVELS.sample)
+    rays = max(ROUGH["rays"] * LEVELS.sample // len(sample), 1)
+    start = np.repeat(field.scene.off_surface(atlas.position[sample], atlas.normal[sample]), rays, 0)
+    directions, _ = turned(cosine_patterns(rays, seed), atlas.normal[sample], np.random.default_rng(seed))
+    hit_elements = np.unique(field.elements(field.scene.intersect(start, directions.reshape(-1, 3))))
+    dark = hit_elements[(hit_elements >= 0) & even[hit_elements].any(1) & ~field.radiance[hit_elements].any(1)]
     if not len(dark):
         return field
     lit_room = field.with_light(even)
-    E, reached = (_rough(lit_room, own, **how)[0] for own in (lit, dark))
-    lamps = {lamp.object_id for lamp in find_seen(atlas.object_id[lit], field.radiance[lit], E)}
-    usual = np.zeros((int(atlas.object_id.max()) + 1, 3), np.float32)
-    for one, own in by_number(atlas.object_id[lit]).items():
-        if one not in lamps:
-            usual[one] = np.median(E[own], 0)
-    usual = usual[atlas.object_id[dark]]
-    told = (usual > 0).all(1)
-    even[dark[told]] *= reached[told] / usual[told]
+    E, reached = (_rough(lit_room, elements, **gathering)[0] for elements in (sample, dark))
+    lamps = {lamp.object_id for lamp in find_seen(atlas.object_id[sample], field.radiance[sample], E)}
+    typical = np.zeros((int(atlas.object_id.max()) + 1, 3), np.float32)
+    for object_id, members in by_number(atlas.object_id[sample]).items():
+        if object_id not in lamps:
+            typical[object_id] = np.median(E[members], 0)
+    typical = typical[atlas.object_id[dark]]
+    valid = (typical > 0).all(1)
+    even[dark[valid]] *= reached[valid] / typical[valid]
     return field.with_unseen(even)
 
 
-def _rough(field: LightField, element: np.ndarray, **how: Unpack[Gathering]) -> tuple[np.ndarray, np.ndarray]:
+def _rough(field: LightField, element: np.ndarray, **gathering: Unpack[Gathering]) -> tuple[np.ndarray, np.ndarray]:
     """E ((m, 3) float32) at m elements and the share of rays that left the mesh ((m,)), by few rays at few places."""
-    how["finest"] *= GATHER.unseen_coarser
-    E, escaped, _, _ = irradiance(field, element, **ROUGH, interpolate=True, **how)
+    gathering["finest"] *= GATHER.unseen_coarser
+    E, escaped, _, _ = irradiance(field, element, **ROUGH, interpolate=True, **gathering)
     return E, escaped

@@ -55,7 +55,7 @@ class Atlas:
 
     @cached_property
     def texel_edge(self) -> float:
-        """Edge of a usual element, metres."""
+        """Edge of a typical element, metres."""
         return float(np.sqrt(np.median(self.area)))
 
     @property
@@ -89,8 +89,8 @@ class Atlas:
     def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""
         flat = np.full((self.size * self.size, *values.shape[1:]), empty, values.dtype)
-        shown = self.padding >= 0
-        flat[shown] = values[self.padding[shown]]
+        covered = self.padding >= 0
+        flat[covered] = values[self.padding[covered]]
         return flat.reshape(self.size, self.size, *values.shape[1:])
 
 
@@ -101,7 +101,7 @@ def room_box(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     between.
     """
     low, high = position.min(0), position.max(0)
-    outer, few = SPARSE.outer, 1 - LEVELS.nearly_all
-    start, first, last, end = np.quantile(position, (few, outer, 1 - outer, 1 - few), axis=0)
-    least, most = first - (last - first) / 2, last + (last - first) / 2
-    return np.where(low < least, np.maximum(start, least), low), np.where(high > most, np.minimum(end, most), high)
+    outer, outliers = SPARSE.outer, 1 - LEVELS.nearly_all
+    start, first, last, end = np.quantile(position, (outliers, outer, 1 - outer, 1 - outliers), axis=0)
+    lower, upper = first - (last - first) / 2, last + (last - first) / 2
+    return np.where(low < lower, np.maximum(start, lower), low), np.where(high > upper, np.minimum(end, upper), high)

@@ -29,18 +29,22 @@ def as_scanned(mesh: Mesh) -> Mesh:
     )  # fmt: skip
 
 
-def opened(capture: Capture) -> Capture:
+def without_closing(capture: Capture) -> Capture:
     """A capture whose mesh is `as_scanned`."""
     mesh = as_scanned(capture.mesh)
-    left = set(np.unique(mesh.object_id).tolist())
-    return replace(capture, mesh=mesh, instances=tuple(one for one in capture.instances if one.object_id in left))
+    remaining = set(np.unique(mesh.object_id).tolist())
+    return replace(
+        capture,
+        mesh=mesh,
+        instances=tuple(instance for instance in capture.instances if instance.object_id in remaining),
+    )
 
 
-def settled(mesh: Mesh) -> Mesh:
+def with_aligned_closing(mesh: Mesh) -> Mesh:
     """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
 
     They were laid out behind all of its noise. A step of a centimetre in a floor throws a shadow of several where light
-    comes in low. Faces that hang together move as one plane, so that none of their edges parts. Crumbs of the scan over
+    comes in low. Faces that are connected move as one plane, so that none of their edges parts. Crumbs of the scan over
     the midst of them, as where it ends far from all cameras, are laid flat onto that plane.
     """
     if mesh.closed is None or not len(mesh.closed):
@@ -49,44 +53,44 @@ def settled(mesh: Mesh) -> Mesh:
     gap = plane_gap(scan.vertices)
     centre, facing = scan.vertices[scan.triangles].mean(1).astype(np.float64), scan.geometry[0]
     tree, vertices = cKDTree(centre), mesh.vertices.copy()
-    closing, turned = mesh.triangles[mesh.closed], mesh.geometry[0][mesh.closed]
+    closing, normals = mesh.triangles[mesh.closed], mesh.geometry[0][mesh.closed]
     label = connected(closing)
     for piece in range(int(label.max()) + 1):
         faces = label == piece
-        own, normal = np.unique(closing[faces]), turned[faces].mean(0)
+        used, normal = np.unique(closing[faces]), normals[faces].mean(0)
         normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
-        at = mesh.vertices[own].astype(np.float64)
-        middle = at.mean(0)
-        beside = _near(tree, at, 2 * gap)
-        beside = beside[facing[beside] @ normal > np.cos(PARTS.tilt)]
-        height = (centre[beside] - middle) @ normal
-        beside = beside[np.abs(height) < gap]
-        if len(beside) < LEVELS.few:
+        positions = mesh.vertices[used].astype(np.float64)
+        middle = positions.mean(0)
+        neighbours = _near(tree, positions, 2 * gap)
+        neighbours = neighbours[facing[neighbours] @ normal > np.cos(PARTS.tilt)]
+        height = (centre[neighbours] - middle) @ normal
+        neighbours = neighbours[np.abs(height) < gap]
+        if len(neighbours) < LEVELS.few:
             continue
-        lies = _plane_through(centre[beside] - middle, normal, at - middle)
-        off = (centre[beside] - middle) @ normal - lies(centre[beside] - middle)
-        spread = SIGMA_OF_MAD * float(np.median(np.abs(off)))
-        under = max(spread, CLOSING.under * gap)
-        rise = lies(at - middle) - under - (at - middle) @ normal
-        vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
-        corner = np.searchsorted(own, closing[faces])
-        corners = vertices[own][corner].astype(np.float64)
+        height_at = _plane_through(centre[neighbours] - middle, normal, positions - middle)
+        deviation = (centre[neighbours] - middle) @ normal - height_at(centre[neighbours] - middle)
+        spread = SIGMA_OF_MAD * float(np.median(np.abs(deviation)))
+        depth = max(spread, CLOSING.under * gap)
+        rise = height_at(positions - middle) - depth - (positions - middle) @ normal
+        vertices[used] = positions + np.clip(rise, -gap, gap)[:, None] * normal
+        corner = np.searchsorted(used, closing[faces])
+        corners = vertices[used][corner].astype(np.float64)
         # What frames saw is closed in single cells. Where they saw none, a curtain may hang before a wall.
         single = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).min(1) < LEVELS.likely * gap
         near = _near(tree, corners[single].mean(1), 3 * gap)
-        off = np.abs((centre[near] - middle) @ normal - lies(centre[near] - middle))
-        near = near[(off > LEVELS.likely * under) | (facing[near] @ normal < np.cos(PARTS.tilt))]
-        over = _over_midst(RayScene(vertices[own], corner[single]), centre[near], normal, gap)
-        crumbs = np.unique(scan.triangles[near[over]])
-        place = mesh.vertices[crumbs].astype(np.float64) - middle
-        height = lies(place) - place @ normal
-        flat = np.abs(height) < gap
-        vertices[crumbs[flat]] += (height[flat, None] * normal).astype(vertices.dtype)
+        deviation = np.abs((centre[near] - middle) @ normal - height_at(centre[near] - middle))
+        near = near[(deviation > LEVELS.likely * depth) | (facing[near] @ normal < np.cos(PARTS.tilt))]
+        covering = _over_midst(RayScene(vertices[used], corner[single]), centre[near], normal, gap)
+        crumb_vertices = np.unique(scan.triangles[near[covering]])
+        offset = mesh.vertices[crumb_vertices].astype(np.float64) - middle
+        height = height_at(offset) - offset @ normal
+        close = np.abs(height) < gap
+        vertices[crumb_vertices[close]] += (height[close, None] * normal).astype(vertices.dtype)
     return replace(mesh, vertices=vertices)
 
 
 def _near(tree: cKDTree, points: np.ndarray, radius: float) -> np.ndarray:
-    """What lies within a radius of any of n points ((n, 3)), (k,) int."""
+    """Indices of what lies within a radius of any of the points ((n, 3)), (k,) int."""
     return np.unique(np.concatenate([np.zeros(0), *tree.query_ball_point(points, radius)])).astype(int)
 
 
@@ -102,25 +106,25 @@ def _over_midst(cover: RayScene, points: np.ndarray, normal: np.ndarray, gap: fl
     return over
 
 
-def _plane_through(points: np.ndarray, normal: np.ndarray, wanted: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def _plane_through(points: np.ndarray, normal: np.ndarray, targets: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Height along a normal, of a plane fitted robustly to points ((n, 3)), as a function of places ((k, 3)).
 
-    It is tilted only along what the points reach over half of the `wanted` places ((m, 3)): else it would be a guess.
+    It is tilted only along what the points reach over half of the `targets` places ((m, 3)): else it would be a guess.
     """
     right, up = plane_axes(normal, [])
     across = np.stack([points @ right, points @ up], 1)
     reach = np.ptp(across, axis=0)
-    reach = np.where(2 * reach > np.ptp(np.stack([wanted @ right, wanted @ up], 1), axis=0), reach, np.inf)
-    base = np.concatenate([np.ones((len(points), 1)), (across - across.mean(0)) / reach], 1)
+    reach = np.where(2 * reach > np.ptp(np.stack([targets @ right, targets @ up], 1), axis=0), reach, np.inf)
+    design = np.concatenate([np.ones((len(points), 1)), (across - across.mean(0)) / reach], 1)
     height, weight = points @ normal, np.ones(len(points))
     for _ in range(PARTS.fits):
-        slope = np.linalg.lstsq(base * weight[:, None], height * weight, rcond=None)[0]
-        off = np.abs(height - base @ slope)
-        weight = 1 / np.sqrt(1 + (off / max(SIGMA_OF_MAD * float(np.median(off)), 1e-9)) ** 2)
+        slope = np.linalg.lstsq(design * weight[:, None], height * weight, rcond=None)[0]
+        residual = np.abs(height - design @ slope)
+        weight = 1 / np.sqrt(1 + (residual / max(SIGMA_OF_MAD * float(np.median(residual)), 1e-9)) ** 2)
     middle = across.mean(0)
 
-    def at(places: np.ndarray) -> np.ndarray:
-        own = np.stack([places @ right, places @ up], 1)
-        return np.asarray(slope[0] + ((own - middle) / reach) @ slope[1:])
+    def height_at(places: np.ndarray) -> np.ndarray:
+        coordinates = np.stack([places @ right, places @ up], 1)
+        return np.asarray(slope[0] + ((coordinates - middle) / reach) @ slope[1:])
 
-    return at
+    return height_at

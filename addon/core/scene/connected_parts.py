@@ -1,4 +1,4 @@
-"""Objects for a mesh that tells of none: its connected parts."""
+"""Objects for a mesh that names none: its connected parts."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,9 +28,9 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = np.bincount(part, area)
     order = np.argsort(-surface, kind="stable")
-    kept = order[: max(int((surface[order[: LEVELS.most]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
+    largest = order[: max(int((surface[order[: LEVELS.most]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
     number = np.full(len(surface), -1)
-    number[kept] = np.arange(len(kept))
+    number[largest] = np.arange(len(largest))
     return to_nearest(number[part], (a + b + c) / 3)
 
 

@@ -7,28 +7,28 @@ import numpy as np
 from .atlas import Atlas
 from .model import Mesh
 from .params import CREASES
-from .two_sides import fronts, other_way
+from .two_sides import flipped, fronts
 from .weld import one_place, welded
 
 
 def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
     """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
-    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
+    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what is beyond is not known. 0 at a
     sliver's edges. A sheet's second side bends as its first one does. Of triangles that are not `wanted` ((t,) bool),
     anything."""
     if mesh.backs is not None:
         single, sheet = fronts(mesh)
-        either = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
-        angle = edge_angles(single, either)
-        return np.concatenate([angle, other_way(angle[mesh.backs])])
+        wanted_fronts = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
+        angle = edge_angles(single, wanted_fronts)
+        return np.concatenate([angle, flipped(angle[mesh.backs])])
     points, faces, _ = welded(mesh, one_place(mesh.vertices))
     if wanted is not None:
-        # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.
+        # Triangles that share an edge have two of its points: the others don't matter, and may be most of a million.
         used = np.zeros(len(points), bool)
         used[faces[wanted]] = True
-        kept = np.flatnonzero(used[faces].sum(1) >= 2)
+        near = np.flatnonzero(used[faces].sum(1) >= 2)
         result = np.zeros((len(faces), 3))
-        result[kept] = _angles(replace(mesh, triangles=mesh.triangles[kept]), points, faces[kept])
+        result[near] = _angles(replace(mesh, triangles=mesh.triangles[near]), points, faces[near])
         return result
     return _angles(mesh, points, faces)
 
@@ -42,14 +42,14 @@ def _angles(mesh: Mesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], 1), 2).reshape(-1, 2)
     _, edge, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
     edge = edge.ravel()
-    own = np.repeat(normal, 3, 0).astype(np.float64)
+    normals = np.repeat(normal, 3, 0).astype(np.float64)
     # Each triangle against the next one at its edge, in a circle: of two, that is the other one.
     order = np.argsort(edge, kind="stable")
     start = np.cumsum(count) - count
     rank = np.arange(len(edge)) - start[edge[order]]
     following = order[start[edge[order]] + (rank + 1) % count[edge[order]]]
     cosine = np.empty(len(edge))
-    cosine[order] = np.abs((own[order] * own[following]).sum(1))
+    cosine[order] = np.abs((normals[order] * normals[following]).sum(1))
     angle = np.arccos(np.clip(cosine, 0, 1))
     angle[count[edge] == 1] = np.pi / 2
     angle[np.bincount(edge, sliver, len(count))[edge] > 0] = 0
@@ -71,11 +71,11 @@ def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
     triangle, position = atlas.triangle[bent], atlas.position[bent]
     for k in range(3):
         a, b = corners[triangle, (k + 1) % 3], corners[triangle, (k + 2) % 3]
-        way = b - a
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
-        off = position - a
-        off -= (off * way).sum(1, keepdims=True) * way
-        near = np.maximum(1 - np.linalg.norm(off, axis=1) / (CREASES.reach * texel), 0)
-        felt = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
-        relative_error[bent] = np.maximum(relative_error[bent], felt)
+        direction = b - a
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-12)
+        offset = position - a
+        offset -= (offset * direction).sum(1, keepdims=True) * direction
+        near = np.maximum(1 - np.linalg.norm(offset, axis=1) / (CREASES.reach * texel), 0)
+        error = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
+        relative_error[bent] = np.maximum(relative_error[bent], error)
     return relative_error

@@ -71,25 +71,25 @@ class ElementGroups:
         self._seen[self._key(camera)] = camera.lens, _packed(valid), _packed(seen)
 
     def seen(self, camera: Camera, valid: np.ndarray) -> np.ndarray | None:
-        """What is remembered of a camera, (k,) int32; None where that is nothing, or other pixels are valid now."""
-        found = self._seen.get(self._key(camera))
-        if found is None or (valid.ravel() > _unpacked(found[1], valid.size)).any():
+        """What is remembered of a camera, (k,) int32; None where nothing is, or where other pixels are valid now."""
+        remembered = self._seen.get(self._key(camera))
+        if remembered is None or (valid.ravel() > _unpacked(remembered[1], valid.size)).any():
             return None
-        return np.flatnonzero(_unpacked(found[2], len(self._group))).astype(np.int32)
+        return np.flatnonzero(_unpacked(remembered[2], len(self._group))).astype(np.int32)
 
     def candidates(self, view: FrameView) -> np.ndarray:
         """Elements that the frame may see, sorted: (k,) int32."""
         camera = view.camera
-        shown = np.zeros(max(self._object_id.max(initial=0), view.object_id.max()) + 2, bool)
-        shown[view.object_id.ravel()] = True  # -1 marks the last
-        keep = shown[self._object_id]
+        visible_ids = np.zeros(max(self._object_id.max(initial=0), view.object_id.max()) + 2, bool)
+        visible_ids[view.object_id.ravel()] = True  # -1 marks the last
+        keep = visible_ids[self._object_id]
         keep &= self._in_frustum(camera) if camera.lens is None else self._in_cone(camera)
         to_camera = camera.centre - self._centre
         distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-12)
         cosine = np.einsum("ij,ij->i", to_camera, self._axis) / distance
         # The smallest angle that any normal of the cone can make with the way from any point of the ball.
-        least = np.arccos(np.clip(cosine, -1, 1)) - self._opening - np.arcsin(np.minimum(self._radius / distance, 1))
-        keep &= (least < np.arccos(VISIBILITY.min_cosine) + SLACK) | (distance <= self._radius)
+        smallest = np.arccos(np.clip(cosine, -1, 1)) - self._opening - np.arcsin(np.minimum(self._radius / distance, 1))
+        keep &= (smallest < np.arccos(VISIBILITY.min_cosine) + SLACK) | (distance <= self._radius)
         return np.flatnonzero(keep[self._group]).astype(np.int32)
 
     def _in_frustum(self, camera: Camera) -> np.ndarray:
@@ -97,27 +97,27 @@ class ElementGroups:
         local = (self._centre - camera.centre) @ camera.camera_to_world[:3, :3]
         depth = -local[:, 2]
         keep = depth > -self._radius
-        for along, f, c, extent in (
+        for offset, f, c, extent in (
             (local[:, 0], camera.fx, camera.cx, camera.width),
             (-local[:, 1], camera.fy, camera.cy, camera.height),
         ):
             # Signed distance to the frustum's two planes: f * along + c * depth is 0 at the frame's first column.
-            keep &= f * along + c * depth > -self._radius * np.hypot(f, c)
-            keep &= f * along + (c - extent) * depth < self._radius * np.hypot(f, c - extent)
+            keep &= f * offset + c * depth > -self._radius * np.hypot(f, c)
+            keep &= f * offset + (c - extent) * depth < self._radius * np.hypot(f, c - extent)
         return keep
 
     def _in_cone(self, camera: Camera) -> np.ndarray:
         """Groups that the cone around a lens's widest ray may reach."""
-        away = self._centre - camera.centre
-        distance = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
-        angle = np.arccos(np.clip(-(away @ camera.camera_to_world[:3, 2]) / distance, -1, 1))
+        offset = self._centre - camera.centre
+        distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-12)
+        angle = np.arccos(np.clip(-(offset @ camera.camera_to_world[:3, 2]) / distance, -1, 1))
         ball = np.arcsin(np.minimum(self._radius / distance, 1))
         return (angle - ball < widest_angle(camera) + SLACK) | (distance <= self._radius)
 
 
-def _packed(marks: np.ndarray) -> bytes:
-    """Marks (bool) in a few bytes: they lie in rows."""
-    return zlib.compress(np.packbits(marks).tobytes(), 1)
+def _packed(mask: np.ndarray) -> bytes:
+    """A mask (bool) in a few bytes: equal values lie in runs."""
+    return zlib.compress(np.packbits(mask).tobytes(), 1)
 
 
 def _unpacked(packed: bytes, count: int) -> np.ndarray:

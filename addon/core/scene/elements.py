@@ -16,7 +16,7 @@ from .rays import Hits, RayScene
 from .seen_cells import SeenCells
 from .uv_islands import areas, connected, corner_ids
 
-# Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
+# Where in a texel the triangle that covers it is looked up: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
 SUBSAMPLES = np.array(
     [[0, 0], [-0.25, -0.25], [0.25, 0.25], [-0.25, 0.25], [0.25, -0.25],
@@ -57,18 +57,18 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     triangle = np.full(size * size, -1, np.int32)
     u, v = np.zeros(size * size, np.float32), np.zeros(size * size, np.float32)
 
-    def ask(texels: np.ndarray, shift: np.ndarray) -> None:
+    def look_up(texels: np.ndarray, shift: np.ndarray) -> None:
         hits = plane.at(texels, shift)
-        found = hits.triangle >= 0
-        at = texels[found]
-        triangle[at], u[at], v[at] = hits.triangle[found], hits.u[found], hits.v[found]
+        hit = hits.triangle >= 0
+        hit_texels = texels[hit]
+        triangle[hit_texels], u[hit_texels], v[hit_texels] = hits.triangle[hit], hits.u[hit], hits.v[hit]
 
     def centres(rows: slice) -> None:
-        ask(np.arange(rows.start * size, rows.stop * size), SUBSAMPLES[0])
+        look_up(np.arange(rows.start * size, rows.stop * size), SUBSAMPLES[0])
 
     def partly(part: slice) -> None:
         for shift in SUBSAMPLES[1:]:
-            ask(wanted[part][triangle[wanted[part]] < 0], shift)
+            look_up(candidates[part][triangle[candidates[part]] < 0], shift)
 
     for_blocks(centres, size, ROWS_AT_ONCE, threads)
     # Only empty texels beside a covered one, or under a triangle too small for any centre, can be covered in part; what
@@ -76,15 +76,15 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     corners = np.clip((uv.reshape(-1, 2) * size).astype(np.int64), 0, size - 1)
     near = ndimage.binary_dilation((triangle >= 0).reshape(size, size), np.ones((3, 3), bool))
     near[corners[:, 1], corners[:, 0]] = True
-    unasked = triangle < 0
-    wanted = np.flatnonzero(near.ravel() & unasked)
-    while len(wanted):
-        unasked[wanted] = False
-        for_blocks(partly, len(wanted), 1 << 15, threads)
-        covered = np.divmod(wanted[triangle[wanted] >= 0], size)
-        rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in covered)
-        around = np.unique(rows[:, None] * size + columns[None])
-        wanted = around[unasked[around]]
+    untested = triangle < 0
+    candidates = np.flatnonzero(near.ravel() & untested)
+    while len(candidates):
+        untested[candidates] = False
+        for_blocks(partly, len(candidates), 1 << 15, threads)
+        covered = np.divmod(candidates[triangle[candidates] >= 0], size)
+        rows, columns = (np.clip(index + np.array([-1, 0, 1])[:, None], 0, size - 1) for index in covered)
+        neighbours = np.unique(rows[:, None] * size + columns[None])
+        candidates = neighbours[untested[neighbours]]
     texel = np.flatnonzero(triangle >= 0).astype(np.int32)
     return texel, triangle[texel], u[texel], v[texel]
 
@@ -135,11 +135,11 @@ def find_elements(
     crumbs : Crumbs, optional
         Triangles that have elements together.
     """
-    whole = np.ones(len(uv), bool)
+    has_texels = np.ones(len(uv), bool)
     if crumbs is not None:
-        whole[crumbs.triangle] = False
-    texel, triangle, u, v = _cover(uv if whole.all() else uv[whole], size, threads)
-    triangle = np.flatnonzero(whole).astype(np.int32)[triangle]
+        has_texels[crumbs.triangle] = False
+    texel, triangle, u, v = _cover(uv if has_texels.all() else uv[has_texels], size, threads)
+    triangle = np.flatnonzero(has_texels).astype(np.int32)[triangle]
     position = np.empty((len(texel), 3), np.float32)
     for part in blocks(len(texel), 1 << 18):
         a, b, c = (mesh.vertices[mesh.triangles[triangle[part], i]].astype(np.float64) for i in range(3))
@@ -151,15 +151,15 @@ def find_elements(
     shared = (area[triangle] / count[triangle]).astype(np.float32)
     element = np.full(size * size, -1, np.int32)
     element[texel] = np.arange(len(texel), dtype=np.int32)
-    found = texel, triangle, position, shared
+    fields = texel, triangle, position, shared
     if crumbs is not None and len(crumbs.triangle):
-        more = _of_crumbs(mesh, size, area, crumbs)
-        at = more[0][:, None] + np.array([0, 1, size, size + 1])
-        element[at] = len(texel) + np.arange(len(at), dtype=np.int32)[:, None]
-        found = tuple(np.concatenate(both) for both in zip(found, more, strict=True))
+        crumb_fields = _of_crumbs(mesh, size, area, crumbs)
+        texels_of_crumb = crumb_fields[0][:, None] + np.array([0, 1, size, size + 1])
+        element[texels_of_crumb] = len(texel) + np.arange(len(texels_of_crumb), dtype=np.int32)[:, None]
+        fields = tuple(np.concatenate(both) for both in zip(fields, crumb_fields, strict=True))
     element = element.reshape(size, size)
     row, column = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
-    return _merged(Elements(*found, element[row, column].ravel()), len(texel), coarse)
+    return _merged(Elements(*fields, element[row, column].ravel()), len(texel), coarse)
 
 
 def _of_crumbs(mesh, size, area, crumbs):
@@ -173,32 +173,32 @@ def _of_crumbs(mesh, size, area, crumbs):
 
 def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Of each group ((n,) int, all in use) the point nearest to its middle, which may lie off the surface, (m,) int."""
-    off, count = np.zeros(len(position)), np.bincount(group)
+    square_distance, count = np.zeros(len(position)), np.bincount(group)
     for axis in range(3):
-        off += np.square(position[:, axis] - (np.bincount(group, position[:, axis]) / count)[group])
-    order = np.lexsort((off, group))
+        square_distance += np.square(position[:, axis] - (np.bincount(group, position[:, axis]) / count)[group])
+    order = np.lexsort((square_distance, group))
     return order[np.cumsum(count) - count]
 
 
-def _merged(found: Elements, count: int, coarse: SeenCells | None) -> Elements:
-    """Elements, by rising texel, of which one stands for all of its coarse cell; the first `count` are asked."""
-    own = np.ones(len(found.texel), bool)
+def _merged(elements: Elements, count: int, coarse: SeenCells | None) -> Elements:
+    """Elements, by rising texel, of which one stands for all of its coarse cell; only the first `count` are merged."""
+    separate = np.ones(len(elements.texel), bool)
     if coarse is not None:
-        own[:count] = coarse.seen(found.position[:count], found.triangle[:count])
-    other = np.flatnonzero(~own)
-    if not len(other) and count == len(own):
-        return found
+        separate[:count] = coarse.seen(elements.position[:count], elements.triangle[:count])
+    other = np.flatnonzero(~separate)
+    if not len(other) and count == len(separate):
+        return elements
     assert coarse is not None
-    group = np.unique(coarse.coarse(found.position[other], found.triangle[other]), return_inverse=True)[1].ravel()
-    chosen = other[_nearest_to_middle(found.position[other], group)]
-    own[chosen] = True
-    kept = np.flatnonzero(own)
-    kept = kept[np.argsort(found.texel[kept], kind="stable")]
-    number = np.empty(len(own), np.int32)
-    number[kept] = np.arange(len(kept), dtype=np.int32)
+    group = np.unique(coarse.coarse(elements.position[other], elements.triangle[other]), return_inverse=True)[1].ravel()
+    chosen = other[_nearest_to_middle(elements.position[other], group)]
+    separate[chosen] = True
+    order = np.flatnonzero(separate)
+    order = order[np.argsort(elements.texel[order], kind="stable")]
+    number = np.empty(len(separate), np.int32)
+    number[order] = np.arange(len(order), dtype=np.int32)
     number[other] = number[chosen][group]
-    parts = (found.texel[kept], found.triangle[kept], found.position[kept])
-    return Elements(*parts, np.bincount(number, found.area).astype(np.float32), number[found.padding])
+    parts = (elements.texel[order], elements.triangle[order], elements.position[order])
+    return Elements(*parts, np.bincount(number, elements.area).astype(np.float32), number[elements.padding])
 
 
 def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = None) -> Atlas:
@@ -213,15 +213,15 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = N
     known : Elements, optional
         Of the same atlas; not given: each texel has its own.
     """
-    found = known or find_elements(mesh, uv, size)
+    elements = known or find_elements(mesh, uv, size)
     normal, _ = mesh.geometry
     return Atlas(
         size=size,
         uv=uv,
-        normal=normal[found.triangle],
-        object_id=mesh.object_id[found.triangle],
-        back=None if mesh.backs is None else found.triangle >= len(mesh.triangles) - len(mesh.backs),
-        **found._asdict(),
+        normal=normal[elements.triangle],
+        object_id=mesh.object_id[elements.triangle],
+        back=None if mesh.backs is None else elements.triangle >= len(mesh.triangles) - len(mesh.backs),
+        **elements._asdict(),
     )
 
 
@@ -231,15 +231,15 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     first[atlas.triangle[::-1]] = np.arange(len(atlas) - 1, -1, -1, dtype=np.int32)
     # What lies under its middle in the atlas: beside its own texels, or the one element of many.
     bare = np.flatnonzero(first < 0)
-    under = _under(atlas, bare)
-    first[bare] = np.where(atlas.object_id[under] == mesh.object_id[bare], under, -1)
+    below = _under(atlas, bare)
+    first[bare] = np.where(atlas.object_id[below] == mesh.object_id[bare], below, -1)
     centroid = mesh.vertices[mesh.triangles].mean(1)
-    left = np.flatnonzero(first < 0)
-    for object_id, group in by_number(mesh.object_id[left]).items():
-        bare, own = left[group], atlas.elements_of(object_id)
-        if not len(own):
-            own = np.arange(len(atlas))
-        first[bare] = own[cKDTree(atlas.position[own]).query(centroid[bare])[1]]
+    missing = np.flatnonzero(first < 0)
+    for object_id, group in by_number(mesh.object_id[missing]).items():
+        bare, elements = missing[group], atlas.elements_of(object_id)
+        if not len(elements):
+            elements = np.arange(len(atlas))
+        first[bare] = elements[cKDTree(atlas.position[elements]).query(centroid[bare])[1]]
     return first
 
 
@@ -255,18 +255,18 @@ def shown_uv(mesh: Mesh, atlas: Atlas) -> np.ndarray:
 
     An island too small for a texel would show another object's: it lies in the middle of the one that stands for it.
     """
-    other = atlas.object_id[_under(atlas, np.arange(len(mesh.triangles)))] != mesh.object_id
-    if not other.any():
+    foreign = atlas.object_id[_under(atlas, np.arange(len(mesh.triangles)))] != mesh.object_id
+    if not foreign.any():
         return atlas.uv
     touched = np.zeros(len(mesh.vertices), bool)
-    touched[mesh.triangles[other]] = True
+    touched[mesh.triangles[foreign]] = True
     near = np.flatnonzero(touched[mesh.triangles].any(1))
     island = connected(corner_ids(mesh.triangles[near], atlas.uv[near]))
-    lost = np.bincount(island, ~other[near]) == 0
+    invisible = np.bincount(island, ~foreign[near]) == 0
     first = near[np.unique(island, return_index=True)[1]]
     texel = atlas.texel[element_of_triangle(mesh, atlas)[first]]
     middle = np.stack([texel % atlas.size, texel // atlas.size], 1) + 0.5
-    uv, moved = atlas.uv.copy(), lost[island]
+    uv, moved = atlas.uv.copy(), invisible[island]
     uv[near[moved]] = (middle / atlas.size)[island[moved], None]
     return uv
 
@@ -278,15 +278,15 @@ class ElementLookup:
         self._atlas, self._object_id = atlas, mesh.object_id
         self._of_triangle = element_of_triangle(mesh, atlas)
         # Atlas coordinates in texels are linear in the barycentric ones: x + u dx_u + v dx_v, and y alike.
-        at = atlas.uv.astype(np.float64) * atlas.size
-        edges = at[:, 1:] - at[:, :1]
-        self._map = np.concatenate([at[:, 0], edges.transpose(0, 2, 1).reshape(-1, 4)], 1).astype(np.float32)
+        corners = atlas.uv.astype(np.float64) * atlas.size
+        edges = corners[:, 1:] - corners[:, :1]
+        self._map = np.concatenate([corners[:, 0], edges.transpose(0, 2, 1).reshape(-1, 4)], 1).astype(np.float32)
         # A triangle too small for a texel of its own may show another object's: those alone are looked at closely.
         self._close = np.bincount(atlas.triangle, minlength=len(mesh.triangles)) == 0
-        every = np.arange(len(mesh.triangles))
+        all_triangles = np.arange(len(mesh.triangles))
         for u, v in ((0.01, 0.01), (0.98, 0.01), (0.01, 0.98), (1 / 3, 1 / 3)):
-            point = np.full((2, len(every)), ((u,), (v,)), np.float32)
-            self._close |= atlas.object_id[self._texel(every, *point)] != mesh.object_id
+            point = np.full((2, len(all_triangles)), ((u,), (v,)), np.float32)
+            self._close |= atlas.object_id[self._texel(all_triangles, *point)] != mesh.object_id
 
     @cached_property
     def bare(self) -> tuple[np.ndarray, np.ndarray]:
@@ -315,6 +315,6 @@ class ElementLookup:
         """
         element = self._texel(triangle, u, v)
         close = np.flatnonzero(self._close.take(triangle))
-        other = close[self._atlas.object_id[element[close]] != self._object_id[triangle[close]]]
-        element[other] = self._of_triangle[triangle[other]]
+        foreign = close[self._atlas.object_id[element[close]] != self._object_id[triangle[close]]]
+        element[foreign] = self._of_triangle[triangle[foreign]]
         return element

@@ -25,11 +25,11 @@ def with_frames_that_add(capture: Capture, threads: int = 0) -> Capture:
     if chosen.all():
         return capture
     frames = tuple(frame for frame, adds in zip(capture.frames, chosen, strict=True) if adds)
-    told = (
+    warning = (
         f"{len(capture.frames) - len(frames)} of {len(capture.frames)} frames show nothing that others don't show from "
         "as near and were passed over; --without frame-choice takes all."
     )
-    return replace(capture, frames=frames, warnings=(*capture.warnings, told))
+    return replace(capture, frames=frames, warnings=(*capture.warnings, warning))
 
 
 def frames_that_add(mesh: Mesh, cameras: Sequence[Camera], threads: int = 0) -> np.ndarray:
@@ -43,13 +43,13 @@ def frames_that_add(mesh: Mesh, cameras: Sequence[Camera], threads: int = 0) -> 
         level = np.log2(step * pixel_edges(camera, pixels, hits)).round().astype(np.int64)
         place = (camera.centre + hits.distance[:, None] * directions) / np.exp2(level)[:, None]
         # Cells of a cube around the spot: three by three on each face.
-        way = np.round(1.5 * directions / np.abs(directions).max(1, keepdims=True))
-        label = side[hits.triangle] * 125 + (way + 2).astype(np.int64) @ np.array([25, 5, 1])
+        cube_cell = np.round(1.5 * directions / np.abs(directions).max(1, keepdims=True))
+        label = side[hits.triangle] * 125 + (cube_cell + 2).astype(np.int64) @ np.array([25, 5, 1])
         return np.unique(cell_numbers(np.floor(place).astype(np.int64), label, level))
 
     seen = list(ordered_map(look, cameras, threads))
     number = np.unique(np.concatenate(seen), return_inverse=True)[1]
-    cells = np.split(number, np.cumsum([len(one) for one in seen])[:-1])
+    cells = np.split(number, np.cumsum([len(cells_of_frame) for cells_of_frame in seen])[:-1])
     count, chosen = np.zeros(number.max(initial=-1) + 1, np.int32), np.zeros(len(cameras), bool)
     for i in _spread(len(cameras)):
         if len(cells[i]) and np.median(count[cells[i]]) < FRAME_CHOICE.enough:
@@ -61,6 +61,6 @@ def frames_that_add(mesh: Mesh, cameras: Sequence[Camera], threads: int = 0) -> 
 def _spread(count: int) -> np.ndarray:
     """Numbers below `count`, each far from those before it (van der Corput's sequence), (count,) int."""
     bits = max((count - 1).bit_length(), 1)
-    one = 1 << np.arange(bits)
-    order = (np.arange(1 << bits)[:, None] & one > 0) @ one[::-1]
+    bit = 1 << np.arange(bits)
+    order = (np.arange(1 << bits)[:, None] & bit > 0) @ bit[::-1]
     return order[order < count]

@@ -41,8 +41,8 @@ class Lens(Protocol):
         Returns
         -------
         points : (n, 2) float64
-            Finite; nonsense where not `seen`.
-        seen : (n,) bool
+            Finite; nonsense where not `valid`.
+        valid : (n,) bool
             False: outside of what the model can map one to one (behind the camera, beyond the fold).
         """
         ...
@@ -57,14 +57,14 @@ class Lens(Protocol):
         Returns
         -------
         rays : (n, 3) float64
-            z where not `seen`.
-        seen : (n,) bool
+            z where not `valid`.
+        valid : (n,) bool
             False: no ray leads there.
         """
         ...
 
 
-def ahead(rays: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """The same rays, those not `seen` replaced by z: what is computed with them stays finite."""
-    rays[~seen] = 0, 0, 1
+def ahead(rays: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """The same rays, those not `valid` replaced by z: what is computed with them stays finite."""
+    rays[~valid] = 0, 0, 1
     return rays

@@ -36,27 +36,27 @@ class FieldOfView:
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rays = np.asarray(rays, np.float64)
-        across, z = _radius(rays), rays[:, 2]
+        radius, z = _radius(rays), rays[:, 2]
         # The angle of a ray that is bent by the factor, so that no tangent is taken of 90 degrees.
-        bent = np.arctan2(2 * math.tan(self.omega / 2) * across, np.maximum(z, 0)) / self.omega
+        bent = np.arctan2(2 * math.tan(self.omega / 2) * radius, np.maximum(z, 0)) / self.omega
         centre = 2 * math.tan(self.omega / 2) / self.omega  # limit of bent / tan(theta) on the axis
-        near = across < 1e-9 * np.abs(z)
-        scale = np.where(near, centre / np.where(z == 0, 1, np.abs(z)), bent / np.maximum(across, TINY))
+        near = radius < 1e-9 * np.abs(z)
+        scale = np.where(near, centre / np.where(z == 0, 1, np.abs(z)), bent / np.maximum(radius, TINY))
         return rays[:, :2] * scale[:, None], z > 0
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         points = np.asarray(points, np.float64)
         radius = _radius(points)
         angle = radius * self.omega
-        seen = angle < math.pi / 2
-        theta = np.arctan(np.tan(np.where(seen, angle, 0)) / (2 * math.tan(self.omega / 2)))
+        valid = angle < math.pi / 2
+        theta = np.arctan(np.tan(np.where(valid, angle, 0)) / (2 * math.tan(self.omega / 2)))
         scale = np.sin(theta) / np.maximum(radius, TINY)
-        return ahead(np.stack([points[:, 0] * scale, points[:, 1] * scale, np.cos(theta)], -1), seen), seen
+        return ahead(np.stack([points[:, 0] * scale, points[:, 1] * scale, np.cos(theta)], -1), valid), valid
 
 
 @dataclass(frozen=True)
 class Division:
-    """tan(theta) = r_d / (1 + k r_d^2); for k < 0 it goes on behind the camera.
+    """tan(theta) = r_d / (1 + k r_d^2); for k < 0 it continues behind the camera.
 
     Fitzgibbon, "Simultaneous linear estimation of multiple view geometry and lens distortion" (CVPR 2001); COLMAP's
     DIVISION and SIMPLE_DIVISION.
@@ -74,21 +74,21 @@ class Division:
         rays = np.asarray(rays, np.float64)
         square, z = rays[:, 0] ** 2 + rays[:, 1] ** 2, rays[:, 2]
         # The smaller root of k rho r^2 - z r + rho = 0, as r / rho.
-        inside = z**2 - 4 * self.k * square
-        root = np.sqrt(np.maximum(inside, 0))
+        discriminant = z**2 - 4 * self.k * square
+        root = np.sqrt(np.maximum(discriminant, 0))
         # For z < 0 the sum loses its digits; its product with the difference is -4 k rho^2.
-        below = np.where(z < 0, -4 * self.k * square / np.maximum(root - z, 1e-300), z + root)
-        seen = (inside >= 0) & (below > 1e-14 * np.maximum(root, np.abs(z)))
+        denominator = np.where(z < 0, -4 * self.k * square / np.maximum(root - z, 1e-300), z + root)
+        valid = (discriminant >= 0) & (denominator > 1e-14 * np.maximum(root, np.abs(z)))
         if self.k >= 0:
-            seen &= z > 0
-        return rays[:, :2] * (2 / np.where(seen, below, 1))[:, None], seen
+            valid &= z > 0
+        return rays[:, :2] * (2 / np.where(valid, denominator, 1))[:, None], valid
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         points = np.asarray(points, np.float64)
         square = (points**2).sum(1)
         rays = np.stack([points[:, 0], points[:, 1], 1 + self.k * square], -1)
-        seen = self.k * square <= 1  # beyond 1 / sqrt(k) the radius folds back; never for k < 0
-        return ahead(rays / np.linalg.norm(rays, axis=1, keepdims=True), seen), seen
+        valid = self.k * square <= 1  # beyond 1 / sqrt(k) the radius folds back; never for k < 0
+        return ahead(rays / np.linalg.norm(rays, axis=1, keepdims=True), valid), valid
 
 
 @dataclass(frozen=True)
@@ -122,19 +122,19 @@ class EnhancedUnified:
         rays = np.asarray(rays, np.float64)
         z = rays[:, 2]
         d = np.sqrt(self.beta * (rays[:, 0] ** 2 + rays[:, 1] ** 2) + z**2)
-        seen = z > -self._behind * d
-        below = self.alpha * d + (1 - self.alpha) * z
-        seen &= below > 1e-14 * d
-        return rays[:, :2] / np.where(seen, below, 1)[:, None], seen
+        valid = z > -self._behind * d
+        denominator = self.alpha * d + (1 - self.alpha) * z
+        valid &= denominator > 1e-14 * d
+        return rays[:, :2] / np.where(valid, denominator, 1)[:, None], valid
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         points = np.asarray(points, np.float64)
         square = self.beta * (points**2).sum(1)
-        inside = 1 - (2 * self.alpha - 1) * square
-        seen = inside >= 0
-        z = (1 - self.alpha**2 * square) / (self.alpha * np.sqrt(np.where(seen, inside, 1)) + 1 - self.alpha)
+        radicand = 1 - (2 * self.alpha - 1) * square
+        valid = radicand >= 0
+        z = (1 - self.alpha**2 * square) / (self.alpha * np.sqrt(np.where(valid, radicand, 1)) + 1 - self.alpha)
         rays = np.stack([points[:, 0], points[:, 1], z], -1)
-        return ahead(rays / np.linalg.norm(rays, axis=1, keepdims=True), seen), seen
+        return ahead(rays / np.linalg.norm(rays, axis=1, keepdims=True), valid), valid
 
 
 @dataclass(frozen=True)
@@ -152,16 +152,16 @@ class Equirectangular:
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rays = np.asarray(rays, np.float64)
-        across = np.hypot(rays[:, 0], rays[:, 2])
-        points = np.stack([np.arctan2(rays[:, 0], rays[:, 2]), np.arctan2(rays[:, 1], across)], -1)
+        horizontal = np.hypot(rays[:, 0], rays[:, 2])
+        points = np.stack([np.arctan2(rays[:, 0], rays[:, 2]), np.arctan2(rays[:, 1], horizontal)], -1)
         return points, np.ones(len(rays), bool)
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         points = np.asarray(points, np.float64)
-        seen = (np.abs(points[:, 0]) <= math.pi + 1e-9) & (np.abs(points[:, 1]) <= math.pi / 2 + 1e-9)
-        level = np.cos(points[:, 1])
-        rays = np.stack([np.sin(points[:, 0]) * level, np.sin(points[:, 1]), np.cos(points[:, 0]) * level], -1)
-        return ahead(rays, seen), seen
+        valid = (np.abs(points[:, 0]) <= math.pi + 1e-9) & (np.abs(points[:, 1]) <= math.pi / 2 + 1e-9)
+        cosine = np.cos(points[:, 1])
+        rays = np.stack([np.sin(points[:, 0]) * cosine, np.sin(points[:, 1]), np.cos(points[:, 0]) * cosine], -1)
+        return ahead(rays, valid), valid
 
 
 @dataclass(frozen=True)
@@ -190,10 +190,10 @@ class Cropped:
         return (points[:, 0] / self.across) ** 2 + (points[:, 1] / self.down) ** 2 <= 1
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points, seen = self.lens.project(rays)
-        return points, seen & self._inside(points)
+        points, valid = self.lens.project(rays)
+        return points, valid & self._inside(points)
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rays, seen = self.lens.unproject(points)
-        seen = seen & self._inside(np.asarray(points))
-        return ahead(rays, seen), seen
+        rays, valid = self.lens.unproject(points)
+        valid = valid & self._inside(np.asarray(points))
+        return ahead(rays, valid), valid

@@ -25,7 +25,7 @@ class Intrinsics(NamedTuple):
 
 
 class Model(NamedTuple):
-    """One model: whether fx and fy are told apart, how many parameters follow cx and cy, and the lens of those."""
+    """One model: whether fx and fy are one parameter, how many parameters follow cx and cy, and the lens of those."""
 
     number: int
     name: str

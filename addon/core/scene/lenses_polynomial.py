@@ -50,12 +50,12 @@ def _slope(coefficients: tuple[float, ...], s: np.ndarray) -> np.ndarray:
 def _by_blocks(
     function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], values: np.ndarray, width: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What a function of rows ((n, k)) gives, (n, width) and (n,) bool, asked for `BLOCK` of them at a time."""
+    """What a function of rows ((n, k)) gives, (n, width) and (n,) bool, called with `BLOCK` of them at a time."""
     values = np.asarray(values, np.float64)
-    result, seen = np.empty((len(values), width)), np.empty(len(values), bool)
+    result, valid = np.empty((len(values), width)), np.empty(len(values), bool)
     for block in blocks(len(values), BLOCK):
-        result[block], seen[block] = function(values[block])
-    return result, seen
+        result[block], valid[block] = function(values[block])
+    return result, valid
 
 
 @dataclass(frozen=True)
@@ -159,18 +159,18 @@ class Polynomial:
 
     def _project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         x, y, z = rays.T
-        across = np.hypot(x, y)
+        radius = np.hypot(x, y)
         if self.fisheye:
-            theta = np.arctan2(across, z)
-            axis = across <= 1e-12 * np.abs(z)
-            seen = (theta <= self.limit) & ~(axis & (z <= 0))  # straight behind lies a whole circle
-            scale = np.where(axis, 1, theta) / np.where(axis, np.where(z > 0, z, 1), np.maximum(across, 1e-300))
+            theta = np.arctan2(radius, z)
+            axis = radius <= 1e-12 * np.abs(z)
+            valid = (theta <= self.limit) & ~(axis & (z <= 0))  # straight behind lies a whole circle
+            scale = np.where(axis, 1, theta) / np.where(axis, np.where(z > 0, z, 1), np.maximum(radius, 1e-300))
         else:
-            seen = (z > 0) & (across <= self.limit * z)
-            scale = 1 / np.where(seen, z, 1)
-        scale = np.where(seen, scale, 0)
+            valid = (z > 0) & (radius <= self.limit * z)
+            scale = 1 / np.where(valid, z, 1)
+        scale = np.where(valid, scale, 0)
         u, v, _ = self._distort(x * scale, y * scale)
-        return np.stack([u, v], -1), seen
+        return np.stack([u, v], -1), valid
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _by_blocks(self._unproject, points, 3)
@@ -179,20 +179,20 @@ class Polynomial:
         u, v = points.T
         radius = np.hypot(u, v)
         if self.radial:
-            r, seen = self._radius(radius)
+            r, valid = self._radius(radius)
         else:
             r = np.interp(radius, *self._table[::-1])
         scale = np.where(radius > 1e-12, r / np.maximum(radius, 1e-300), 1)
         x, y = u * scale, v * scale
         if not self.radial:
-            x, y, seen = self._refine(u, v, x, y)
+            x, y, valid = self._refine(u, v, x, y)
             r = np.hypot(x, y)
         if self.fisheye:
             rays = np.stack([x * np.sinc(r / np.pi), y * np.sinc(r / np.pi), np.cos(r)], -1)
         else:
             level = 1 / np.sqrt(1 + r * r)
             rays = np.stack([x * level, y * level, level], -1)
-        return ahead(rays, seen), seen
+        return ahead(rays, valid), valid
 
     @functools.cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray]:
@@ -211,80 +211,88 @@ class Polynomial:
     def _radius(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The radius before the radial part: Newton's method between two entries of the table."""
         before, after = self._table
-        seen = target <= after[-1]
-        target = np.where(seen, target, after[-1])
-        place = np.clip(np.searchsorted(after, target), 1, len(after) - 1)
-        low, high = before[place - 1], before[place]
-        span = after[place] - after[place - 1]
-        r = low + (high - low) * np.where(span > 0, (target - after[place - 1]) / np.where(span > 0, span, 1), 0)
-        return _bracketed(self._bent, target, r, low, high), seen
+        valid = target <= after[-1]
+        target = np.where(valid, target, after[-1])
+        index = np.clip(np.searchsorted(after, target), 1, len(after) - 1)
+        low, high = before[index - 1], before[index]
+        span = after[index] - after[index - 1]
+        r = low + (high - low) * np.where(span > 0, (target - after[index - 1]) / np.where(span > 0, span, 1), 0)
+        return _bracketed(self._bent, target, r, low, high), valid
 
     def _refine(self, u: np.ndarray, v: np.ndarray, x: np.ndarray, y: np.ndarray):
         """Newton's method in two dimensions, from the radial part's inverse; steps are halved where they lead astray.
 
-        Returns x, y, and whether they were found within the disc.
+        Returns x, y, and whether they converged within the disc.
         """
-        x, y, found = x.copy(), y.copy(), np.zeros(len(x), bool)
-        at = np.arange(len(x))  # those still searched for
+        x, y, converged = x.copy(), y.copy(), np.zeros(len(x), bool)
+        active = np.arange(len(x))  # those still searched for
         goal = CLOSE * (1 + np.hypot(u, v))
         du, dv, j = self._off(u, v, x, y)
         for _ in range(STEPS_2D):
             size = np.hypot(du, dv)
-            done = size <= goal[at]
-            found[at[done]] = True
-            left = ~done
-            if not left.any():
+            done = size <= goal[active]
+            converged[active[done]] = True
+            todo = ~done
+            if not todo.any():
                 break
-            at, du, dv, size, j = at[left], du[left], dv[left], size[left], tuple(i[left] for i in j)
+            active, du, dv, size, j = active[todo], du[todo], dv[todo], size[todo], tuple(i[todo] for i in j)
             safe = np.maximum(j[0] * j[3] - j[1] * j[2], 1e-12)
             dx, dy = (j[3] * du - j[1] * dv) / safe, (j[0] * dv - j[2] * du) / safe
-            step = np.ones(len(at))
+            step = np.ones(len(active))
             for _ in range(8):
-                nx, ny = x[at] - step * dx, y[at] - step * dy
+                nx, ny = x[active] - step * dx, y[active] - step * dy
                 inward = np.minimum(1, self.limit / np.maximum(np.hypot(nx, ny), 1e-300))
                 nx, ny = nx * inward, ny * inward
-                du, dv, j = self._off(u[at], v[at], nx, ny)
-                worse = np.hypot(du, dv) > np.maximum(size, goal[at])
+                du, dv, j = self._off(u[active], v[active], nx, ny)
+                worse = np.hypot(du, dv) > np.maximum(size, goal[active])
                 if not worse.any():
                     break
                 step[worse] /= 2
-            stuck = worse | (nx == x[at]) & (ny == y[at])
-            x[at], y[at] = nx, ny
-            found[at[stuck & (np.hypot(du, dv) <= 1e3 * goal[at])]] = True  # as near as rounding lets it come
-            at, du, dv, j = at[~stuck], du[~stuck], dv[~stuck], tuple(i[~stuck] for i in j)
-        return x, y, found
+            stuck = worse | (nx == x[active]) & (ny == y[active])
+            x[active], y[active] = nx, ny
+            # As near as rounding lets it come.
+            converged[active[stuck & (np.hypot(du, dv) <= 1e3 * goal[active])]] = True
+            active, du, dv, j = active[~stuck], du[~stuck], dv[~stuck], tuple(i[~stuck] for i in j)
+        return x, y, converged
 
     def _off(self, u: np.ndarray, v: np.ndarray, x: np.ndarray, y: np.ndarray):
-        got_u, got_v, j = self._distort(x, y)
-        return got_u - u, got_v - v, j
+        u_d, v_d, j = self._distort(x, y)
+        return u_d - u, v_d - v, j
 
 
-def _first_fall(good: Callable, radii: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """The radius up to which `good` holds in each direction `phi`: the first of `radii` where not, then by halves."""
-    holds = good(radii[:, None] + 0 * phi, phi)
+def _first_fall(condition: Callable, radii: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """The radius up to which `condition` holds in each direction `phi`: found among `radii`, then by bisection."""
+    holds = condition(radii[:, None] + 0 * phi, phi)
     first = np.where(holds.all(0), len(radii), holds.argmin(0))
     low, high = radii[np.maximum(first - 1, 0)], radii[np.minimum(first, len(radii) - 1)]
     for _ in range(50):
         middle = (low + high) / 2
-        fine = good(middle, phi)
-        low, high = np.where(fine, middle, low), np.where(fine, high, middle)
+        holds_at = condition(middle, phi)
+        low, high = np.where(holds_at, middle, low), np.where(holds_at, high, middle)
     return np.where(first == len(radii), radii[-1], low)
 
 
 def _bracketed(function: Callable, target: np.ndarray, r: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Where a rising function of the radius reaches `target`, known to be between `low` and `high`."""
     result = r.copy()
-    at = np.arange(len(r))
+    active = np.arange(len(r))
     goal = CLOSE * (1 + target)
     for _ in range(STEPS):
         value, slope = function(r)
-        off = value - target[at]
-        result[at] = r
-        left = np.abs(off) > goal[at]
-        if not left.any():
+        residual = value - target[active]
+        result[active] = r
+        todo = np.abs(residual) > goal[active]
+        if not todo.any():
             break
-        at, r, off, slope, low, high = at[left], r[left], off[left], slope[left], low[left], high[left]
-        low, high = np.where(off < 0, r, low), np.where(off > 0, r, high)
-        step = r - off / np.maximum(slope, 1e-300)
+        active, r, residual, slope, low, high = (
+            active[todo],
+            r[todo],
+            residual[todo],
+            slope[todo],
+            low[todo],
+            high[todo],
+        )
+        low, high = np.where(residual < 0, r, low), np.where(residual > 0, r, high)
+        step = r - residual / np.maximum(slope, 1e-300)
         r = np.where((step > low) & (step < high), step, (low + high) / 2)
     return result

@@ -20,11 +20,11 @@ def told_lens(lens: Lens | None) -> list[Any] | None:
     return [type(lens).__name__, [told_lens(v) if type(v).__name__ in KINDS else v for v in values]]
 
 
-def lens_of(told: list[Any] | None) -> Lens | None:
-    """The lens that `told_lens` told. Raises KeyError, TypeError or ValueError for anything else."""
-    if told is None:
+def lens_of(stored: list[Any] | None) -> Lens | None:
+    """The lens that `told_lens` stored. Raises KeyError, TypeError or ValueError for anything else."""
+    if stored is None:
         return None
-    kind, values = told
+    kind, values = stored
     if kind == Cropped.__name__:
         inner = lens_of(values[0])
         if inner is None:

@@ -21,7 +21,7 @@ from .radiometry import Radiometry
 from .stored_light import LitTexture, LitTiles
 
 AUTO = "auto"
-"""The curve of codes that nobody told: calibrated from what frames show together, sRGB's until then."""
+"""The unknown curve of codes: calibrated from what frames show together, sRGB's until then."""
 TRIANGLES_AT_ONCE: Block[int] = 1 << 16
 
 
@@ -72,9 +72,9 @@ class Camera:
         """
         if self.lens is not None:
             local = (points - self.centre) @ self.camera_to_world[:3, :3]
-            image, seen = self.lens.project(local * (1, -1, -1))
+            image, valid = self.lens.project(local * (1, -1, -1))
             distance = np.linalg.norm(local, axis=1)
-            return image * (self.fx, self.fy) + (self.cx, self.cy), np.where(seen, distance, -distance)
+            return image * (self.fx, self.fy) + (self.cx, self.cy), np.where(valid, distance, -distance)
         rotation = self.camera_to_world[:3, :3]
         local = (points - self.centre.astype(points.dtype)) @ rotation.astype(points.dtype)
         depth = -local[:, 2]
@@ -85,7 +85,7 @@ class Camera:
     def directions(self, pixels: np.ndarray) -> np.ndarray:
         """World directions of unit length through `pixels` ((n, 2) float, x and y), as (n, 3) float32.
 
-        Along the optical axis for pixels that no ray leads to; `rays` tells which those are.
+        Along the optical axis for pixels that no ray leads to; `rays` says which those are.
         """
         if self.lens is not None:
             return self.rays(pixels)[0]
@@ -99,8 +99,8 @@ class Camera:
         """`directions` of `pixels` ((n, 2) float), and whether a ray leads there: (n, 3) float32, (n,) bool."""
         if self.lens is None:
             return self.directions(pixels), np.ones(len(pixels), bool)
-        local, seen = self.lens.unproject((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
-        return ((local * (1, -1, -1)) @ self.camera_to_world[:3, :3].T).astype(np.float32), seen
+        local, valid = self.lens.unproject((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
+        return ((local * (1, -1, -1)) @ self.camera_to_world[:3, :3].T).astype(np.float32), valid
 
     def pixel_angles(self, pixels: np.ndarray) -> np.ndarray:
         """Edge in radians of a square as large as what each of `pixels` ((n, 2) float) covers, (n,) float32.
@@ -109,10 +109,10 @@ class Camera:
         """
         if self.lens is None:
             return np.full(len(pixels), 1 / np.sqrt(self.fx * self.fy), np.float32)
-        ends, seen = zip(*(self.lens.unproject((pixels + shift - (self.cx, self.cy)) / (self.fx, self.fy))
+        ends, valid = zip(*(self.lens.unproject((pixels + shift - (self.cx, self.cy)) / (self.fx, self.fy))
                            for shift in ((-0.5, 0), (0.5, 0), (0, -0.5), (0, 0.5))))  # fmt: skip
         area = np.linalg.norm(np.cross(ends[1] - ends[0], ends[3] - ends[2]), axis=1)
-        return np.where(np.all(seen, 0), np.sqrt(area), np.nan).astype(np.float32)
+        return np.where(np.all(valid, 0), np.sqrt(area), np.nan).astype(np.float32)
 
     @property
     def pixel_angle(self) -> float:
@@ -240,7 +240,7 @@ class Pixels:
 class Instance:
     """One object of the room; `object_id` is what the mesh's faces carry.
 
-    It is a `guess` where nobody told it and the mesh's shape alone did: it may hold things of several materials.
+    It is a `guess` where the mesh's shape alone gives it: it may hold things of several materials.
     """
 
     object_id: int
@@ -255,12 +255,12 @@ class Instance:
 
 def class_names(instances: Iterable[Instance]) -> dict[int, str]:
     """Classes of objects, by their number."""
-    return {one.object_id: one.class_name for one in instances}
+    return {instance.object_id: instance.class_name for instance in instances}
 
 
 @dataclass(frozen=True)
 class KnownMirror:
-    """A flat mirror that the capture itself tells of.
+    """A flat mirror that the capture itself names.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ class Mesh:
     closed : (c,) int32 or None
         Triangles that the capture lacks, by which its holes were closed (`closing`).
     whole : bool
-        Nobody told its objects: they are parts by shape alone, and where two of them border one surface may go on.
+        Its objects are unknown: they are parts by shape alone, and where two of them border one surface may continue.
     """
 
     vertices: np.ndarray

@@ -36,7 +36,7 @@ def overview(mesh: Mesh) -> Camera:
         for y in INWARD
         for turn in 2 * np.pi * np.arange(TRIED) / TRIED
     ]
-    return max(views, key=lambda camera: _worth(camera, scene, normal))
+    return max(views, key=lambda camera: _mean_distance(camera, scene, normal))
 
 
 def _view(place: np.ndarray, height: float, turn: float) -> Camera:
@@ -51,9 +51,9 @@ def _view(place: np.ndarray, height: float, turn: float) -> Camera:
     return Camera(*SIZE, focal, focal, SIZE[0] / 2, SIZE[1] / 2, pose)
 
 
-def _worth(camera: Camera, scene: RayScene, normal: np.ndarray) -> float:
-    across = (np.arange(SEEN) + 0.5) / SEEN
-    pixels = np.stack(np.meshgrid(across * camera.width, across * camera.height), -1).reshape(-1, 2)
+def _mean_distance(camera: Camera, scene: RayScene, normal: np.ndarray) -> float:
+    fraction = (np.arange(SEEN) + 0.5) / SEEN
+    pixels = np.stack(np.meshgrid(fraction * camera.width, fraction * camera.height), -1).reshape(-1, 2)
     directions = camera.directions(pixels)
     hits = scene.intersect(camera.centre, directions)
     front = (hits.triangle >= 0) & (np.einsum("ij,ij->i", normal[hits.triangle], directions) < 0)

@@ -71,22 +71,22 @@ class Pages:
             columns, rows = (_weights(start, count, scale, len(room)) for start, count in ((x0, width), (y0, height)))
             bottom, left = rows[0][0], columns[0][0]
             box = slice(bottom, rows[1][-1] + 1), slice(left, columns[1][-1] + 1)
-            shown = room[box]
-            foreign = np.zeros(shown.shape[:2], bool) if owner is None else owner[box] != number
+            texels = room[box]
+            foreign = np.zeros(texels.shape[:2], bool) if owner is None else owner[box] != number
             if owner is not None and foreign.all() and (owner == number).any():
                 # Too narrow for a texel of its own: what the object shows elsewhere.
-                shown = np.broadcast_to(room[owner == number].mean(0), shown.shape)
+                texels = np.broadcast_to(room[owner == number].mean(0), texels.shape)
             elif foreign.any() and not foreign.all():
-                shown = shown[tuple(distance_transform_edt(foreign, return_distances=False, return_indices=True))]
+                texels = texels[tuple(distance_transform_edt(foreign, return_distances=False, return_indices=True))]
             rows, columns = (
                 (low - start, high - start, share) for (low, high, share), start in ((rows, bottom), (columns, left))
             )
-            part = shown[rows[0][:, None], columns[0]] if scale == 1 else _between(shown, rows, columns)
-            sheet[y : y + height, x : x + width] = part
+            content = texels[rows[0][:, None], columns[0]] if scale == 1 else _between(texels, rows, columns)
+            sheet[y : y + height, x : x + width] = content
             empty[y : y + height, x : x + width] = False
         for page in self.pages:
-            part, gaps = self.of(sheet, page), self.of(empty, page)
-            part[gaps] = part[~gaps].mean(0)
+            content, gaps = self.of(sheet, page), self.of(empty, page)
+            content[gaps] = content[~gaps].mean(0)
         return sheet
 
     def multiply(self, sheet: np.ndarray, other: Pages, factor: np.ndarray) -> None:
@@ -94,11 +94,11 @@ class Pages:
 
         The other has them at the same scale, so texel meets texel.
         """
-        own = self.island[np.isin(self.island_object, other.island_object)].astype(np.int64)
-        there = other.island.astype(np.int64)
-        if len(own) != len(there) or (own[:, [0, 1, 4, 5]] != there[:, [0, 1, 4, 5]]).any():
+        island = self.island[np.isin(self.island_object, other.island_object)].astype(np.int64)
+        other_island = other.island.astype(np.int64)
+        if len(island) != len(other_island) or (island[:, [0, 1, 4, 5]] != other_island[:, [0, 1, 4, 5]]).any():
             raise ValueError("the other layout is not of the same atlas at the same scale")
-        for (x, y, width, height), (x0, y0) in zip(own[:, 2:].tolist(), there[:, 2:4].tolist(), strict=True):
+        for (x, y, width, height), (x0, y0) in zip(island[:, 2:].tolist(), other_island[:, 2:4].tolist(), strict=True):
             sheet[y : y + height, x : x + width] *= factor[y0 : y0 + height, x0 : x0 + width]
 
     def of(self, sheet: np.ndarray, page: Page) -> np.ndarray:
@@ -108,9 +108,9 @@ class Pages:
 
 def _weights(start: float, count: int, scale: float, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For `count` texels from `start` on: the room's texels to both sides, and how near each lies to the second."""
-    at = start + (np.arange(count) + 0.5) / scale - 0.5
-    low = np.floor(at + 1e-6).astype(np.int64)
-    share = np.clip(at - low, 0, 1).astype(np.float32)
+    coordinate = start + (np.arange(count) + 0.5) / scale - 0.5
+    low = np.floor(coordinate + 1e-6).astype(np.int64)
+    share = np.clip(coordinate - low, 0, 1).astype(np.float32)
     return np.clip(low, 0, size - 1), np.clip(low + 1, 0, size - 1), share
 
 
@@ -158,19 +158,21 @@ def lay_out(
     scale = {number: float(scale.get(number, 1.0)) for number in numbers}
     blocks, place, box = {}, np.zeros((len(first), 2)), np.zeros((len(first), 2))
     for number in numbers:
-        own = np.flatnonzero(owner == number)
+        members = np.flatnonzero(owner == number)
         while True:
-            box[own] = np.ceil(extent[own] * scale[number])
-            place[own], width, height = _block(box[own], largest)
-            if width <= largest and (height <= largest or kind == UDIM and box[own].max() <= largest):
+            box[members] = np.ceil(extent[members] * scale[number])
+            place[members], width, height = _block(box[members], largest)
+            if width <= largest and (height <= largest or kind == UDIM and box[members].max() <= largest):
                 break
             scale[number] *= 0.95
-        blocks[number] = own, width, height
+        blocks[number] = members, width, height
     if kind == OBJECT:
         page, tile, offset = _in_blocks(blocks, place)
     else:
         page, tile, offset = _in_few_tiles(blocks, place, box, largest)
-    origin, extents = np.array([(one.x, one.y, one.width, one.height) for one in page]).reshape(-1, 2, 2).swapaxes(0, 1)
+    origin, extents = (
+        np.array([(item.x, item.y, item.width, item.height) for item in page]).reshape(-1, 2, 2).swapaxes(0, 1)
+    )
     sheet = -(-int((origin + extents).max()) // SURFACE.step) * SURFACE.step
     place += origin[tile] + offset
     factor = np.array([scale[int(number)] for number in owner])
@@ -178,7 +180,7 @@ def lay_out(
     of_page = tile[island]
     own_uv = (on_sheet - origin[of_page][:, None]) / extents[of_page][:, None]
     if kind == UDIM:
-        number = np.array([one.number - 1001 for one in page])[of_page]
+        number = np.array([item.number - 1001 for item in page])[of_page]
         own_uv += np.stack([number % 10, number // 10], -1)[:, None]
     return Pages(
         tuple(page),
@@ -191,9 +193,9 @@ def lay_out(
     )
 
 
-def _by_block(island: np.ndarray, at: np.ndarray, object_id: np.ndarray) -> np.ndarray:
-    """Islands ((t,) int) with those of an object in one block, an edge of which is 1 in `at` ((t, 3, 2)), made one."""
-    low, high = (np.floor(edge) for edge in boxes(at, island))
+def _by_block(island: np.ndarray, block_uv: np.ndarray, object_id: np.ndarray) -> np.ndarray:
+    """Islands ((t,) int), those of an object in one block (of edge 1 in `block_uv`, (t, 3, 2)) made one."""
+    low, high = (np.floor(edge) for edge in boxes(block_uv, island))
     within = (low == high).all(1)
     first = np.unique(island, return_index=True)[1]
     place = np.concatenate([low, object_id[first, None]], 1)
@@ -222,8 +224,8 @@ def _block(box: np.ndarray, largest: int) -> tuple[np.ndarray, int, int]:
         int(np.clip(np.ceil(side * shape), box[:, 0].max(), max(largest, box[:, 0].max())))
         for shape in SURFACE.page_shapes
     }
-    found = [shelves(box, width) for width in sorted(widths)]
-    return min(found, key=lambda one: (max(one[1:]) > largest, one[1] * one[2]))
+    layouts = [shelves(box, width) for width in sorted(widths)]
+    return min(layouts, key=lambda layout: (max(layout[1:]) > largest, layout[1] * layout[2]))
 
 
 def _in_blocks(blocks, place):
@@ -231,9 +233,9 @@ def _in_blocks(blocks, place):
     extents = np.array([(width, height) for _, width, height in blocks.values()], np.float64)
     corner, _, _ = shelves(extents, int(max(np.sqrt(extents.prod(1).sum()) * 1.1, extents[:, 0].max())))
     pages, tile = [], np.zeros(len(place), np.int64)
-    for k, (number, (own, width, height)) in enumerate(blocks.items()):
+    for k, (number, (members, width, height)) in enumerate(blocks.items()):
         pages.append(Page(int(number), int(corner[k, 0]), int(corner[k, 1]), int(width), int(height)))
-        tile[own] = k
+        tile[members] = k
     return pages, tile, np.zeros_like(place)
 
 
@@ -243,9 +245,9 @@ def _in_few_tiles(blocks, place, box, largest):
     total = sum(width * height for _, width, height in blocks.values())
     edge = -(-int(max(needed, np.sqrt(total))) // SURFACE.step) * SURFACE.step
     while edge < largest:
-        found = _in_tiles(blocks, place.copy(), box, edge)
-        if len(found[0]) == 1:
-            return found
+        layout = _in_tiles(blocks, place.copy(), box, edge)
+        if len(layout[0]) == 1:
+            return layout
         edge += SURFACE.step
     return _in_tiles(blocks, place, box, largest)
 
@@ -253,34 +255,34 @@ def _in_few_tiles(blocks, place, box, largest):
 def _in_tiles(blocks, place, box, largest):
     """Tiles of one edge, no object on two of them but one that is larger than a tile."""
     parts = []
-    for own, width, height in sorted(blocks.values(), key=lambda one: -one[2]):
+    for members, width, height in sorted(blocks.values(), key=lambda block: -block[2]):
         if height <= largest:
-            parts.append((own, width, height))
+            parts.append((members, width, height))
             continue
         # Row by row: what begins in a tile's height ends in the next.
-        left = own[np.argsort(place[own, 1], kind="stable")]
-        while len(left):
-            base = place[left, 1].min()
-            fits = place[left, 1] + box[left, 1] <= base + largest
-            rows = np.unique(place[left[~fits], 1])
-            now = left[fits & ~np.isin(place[left, 1], rows)] if len(rows) else left
-            place[now, 1] -= base
-            parts.append((now, width, int((place[now, 1] + box[now, 1]).max())))
-            left = np.setdiff1d(left, now)
+        remaining = members[np.argsort(place[members, 1], kind="stable")]
+        while len(remaining):
+            base = place[remaining, 1].min()
+            fits = place[remaining, 1] + box[remaining, 1] <= base + largest
+            rows = np.unique(place[remaining[~fits], 1])
+            placed = remaining[fits & ~np.isin(place[remaining, 1], rows)] if len(rows) else remaining
+            place[placed, 1] -= base
+            parts.append((placed, width, int((place[placed, 1] + box[placed, 1]).max())))
+            remaining = np.setdiff1d(remaining, placed)
     shelves: list[list[int]] = []  # tile, x that is free, y, height
     full: list[int] = []  # height of each tile that is taken
     offset, tile = np.zeros_like(place), np.zeros(len(place), np.int64)
-    for own, width, height in sorted(parts, key=lambda one: -one[2]):
-        shelf = next((one for one in shelves if one[1] + width <= largest and height <= one[3]), None)
+    for members, width, height in sorted(parts, key=lambda part: -part[2]):
+        shelf = next((shelf for shelf in shelves if shelf[1] + width <= largest and height <= shelf[3]), None)
         if shelf is None:
-            where = next((k for k, taken in enumerate(full) if taken + height <= largest), None)
-            if where is None:
-                where = len(full)
+            tile_index = next((k for k, used_height in enumerate(full) if used_height + height <= largest), None)
+            if tile_index is None:
+                tile_index = len(full)
                 full.append(0)
-            shelf = [where, 0, full[where], height]
+            shelf = [tile_index, 0, full[tile_index], height]
             shelves.append(shelf)
-            full[where] += height
-        tile[own], offset[own] = shelf[0], (shelf[1], shelf[2])
+            full[tile_index] += height
+        tile[members], offset[members] = shelf[0], (shelf[1], shelf[2])
         shelf[1] += width
     across = int(np.ceil(np.sqrt(len(full))))
     pages = [Page(1001 + k, k % across * largest, k // across * largest, largest, largest) for k in range(len(full))]

@@ -1,4 +1,4 @@
-"""What the geometry is told: what counts as seen, as a side, as a crease, as noise."""
+"""Parameters of the geometry: what counts as seen, as a side, as a crease, as noise."""
 
 from dataclasses import dataclass
 
@@ -158,7 +158,7 @@ class CreaseParams:
     knee : float
         Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner.
     thin : float
-        A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend.
+        A triangle of less height, relative to its longest edge, has no reliable normal: an edge with it shows no bend.
     most_error : float
         Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
         0.07 to 0.12 on flat parts.
@@ -195,7 +195,7 @@ NOISE = NoiseParams()
 
 @dataclass(frozen=True)
 class SurfaceParams:
-    """How the surface is laid out in texels, and its parts told apart.
+    """How the surface is laid out in texels, and its parts are told apart.
 
     Attributes
     ----------
@@ -304,7 +304,7 @@ class SparseParams:
         kitchen of a million triangles that is half of them, and 0.3 % of the surface; to unwrap them took 600 MiB.
     large : int
         Texels along the root of a triangle's area: one that no frame saw takes no more, however large it is, and only
-        larger ones are asked for the share of them that was seen.
+        larger ones are tested for the share of them that was seen.
     seen_part : float
         A large triangle takes at most so many times the texels of what was seen of it, to a factor of 4.
     outer : float
@@ -341,7 +341,7 @@ class ClosingParams:
     fine : int
         Parts of a cell's edge: a cell is closed of which one is open, 1.6 cm in a room.
     speck : int
-        Cells that hang together, of 4 cm in a room: no window is so small, and a hole that is shows black.
+        Connected cells, of 4 cm in a room: no window is so small, and a hole that is shows black.
     under : float
         Cells that a face lies at least under the scan's denoised border, as the two cover each other: 1 mm in a room.
     """

@@ -46,7 +46,7 @@ class Patches:
     @staticmethod
     def together(parts: Sequence[Patches]) -> Patches:
         """Several that share no triangle and no object."""
-        return Patches(*(np.concatenate([getattr(one, each.name) for one in parts]) for each in fields(Patches)))
+        return Patches(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Patches)))
 
     @property
     def objects(self) -> list[int]:
@@ -61,17 +61,17 @@ class Patches:
     def kept(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
         """Those of some objects alone, numbered without gaps; and the new number of each."""
         numbers = dict(zip(sorted(objects), self.objects, strict=False))
-        kept = np.isin(self.object_id, list(numbers))
-        new = np.array([numbers[int(i)] for i in self.object_id[kept]], np.int32)
+        chosen = np.isin(self.object_id, list(numbers))
+        new = np.array([numbers[int(i)] for i in self.object_id[chosen]], np.int32)
         mirrors = np.array([numbers[int(i)] for i in self.mirrors if i in numbers], np.int32)
-        return Patches(self.triangle[kept], new, mirrors), numbers
+        return Patches(self.triangle[chosen], new, mirrors), numbers
 
     def mesh(self, mesh: Mesh) -> Mesh:
         """A mesh with them set apart; it may lack the second sides (`Mesh.backs`)."""
         if not len(self):
             return mesh
-        object_id, there = mesh.object_id.copy(), self.triangle < len(mesh.object_id)
-        object_id[self.triangle[there]] = self.object_id[there]
+        object_id, present = mesh.object_id.copy(), self.triangle < len(mesh.object_id)
+        object_id[self.triangle[present]] = self.object_id[present]
         return replace(mesh, object_id=object_id)
 
     def surface(self, surface: Surface) -> Surface:
@@ -85,12 +85,12 @@ class Patches:
 
     def capture(self, capture: Capture) -> Capture:
         """A capture with them set apart; as it is where they are already."""
-        known = {one.object_id for one in capture.instances}
+        known_ids = {instance.object_id for instance in capture.instances}
         classes = dict.fromkeys(self.objects, LAMP) | dict.fromkeys(self.mirrors.tolist(), MIRROR)
-        new = tuple(Instance(i, name, guess=True) for i, name in classes.items() if i not in known)
+        new = tuple(Instance(i, name, guess=True) for i, name in classes.items() if i not in known_ids)
         if not new:
             return capture
         mesh = self.mesh(capture.mesh)
-        left = set(np.unique(mesh.object_id).tolist())
-        instances = (*(one for one in capture.instances if one.object_id in left), *new)
+        remaining = set(np.unique(mesh.object_id).tolist())
+        instances = (*(instance for instance in capture.instances if instance.object_id in remaining), *new)
         return replace(capture, mesh=mesh, instances=instances)

@@ -15,7 +15,7 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
     Returns
     -------
     local : (3, height * width) float64
-    seen : (height, width) bool, or None
+    valid : (height, width) bool, or None
         False: no ray leads to the pixel, and its direction means nothing. None: one leads to each.
     """
     return _pixel_rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
@@ -26,8 +26,8 @@ def rays_of_rows(camera: Camera, rows: slice) -> tuple[np.ndarray, np.ndarray | 
     width = camera.width
     if camera.lens is None and width * camera.height > KEPT_PIXELS:
         return _pinhole_rays(width, rows, camera.fx, camera.fy, camera.cx, camera.cy), None
-    local, seen = pixel_rays(camera)
-    return local[:, rows.start * width : rows.stop * width], None if seen is None else seen[rows]
+    local, valid = pixel_rays(camera)
+    return local[:, rows.start * width : rows.stop * width], None if valid is None else valid[rows]
 
 
 KEPT_PIXELS: Block[int] = 1 << 22
@@ -44,9 +44,9 @@ def _pixel_rays(
         return _pinhole_rays(width, slice(0, height), fx, fy, cx, cy), None
     x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
     y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
-    rays, seen = lens.unproject(np.stack([x.ravel(), -y.ravel()], -1))
+    rays, valid = lens.unproject(np.stack([x.ravel(), -y.ravel()], -1))
     local = np.stack([rays[:, 0], -rays[:, 1], -rays[:, 2]])
-    return local, None if seen.all() else seen.reshape(height, width)
+    return local, None if valid.all() else valid.reshape(height, width)
 
 
 def _pinhole_rays(width: int, rows: slice, fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
@@ -59,8 +59,8 @@ def _pinhole_rays(width: int, rows: slice, fx: float, fy: float, cx: float, cy: 
 
 @functools.lru_cache(maxsize=64)
 def _widest(width: int, height: int, fx: float, fy: float, cx: float, cy: float, lens: Lens) -> float:
-    local, seen = _pixel_rays(width, height, fx, fy, cx, cy, lens)
-    if seen is not None:  # the picture ends where the lens does
+    local, valid = _pixel_rays(width, height, fx, fy, cx, cy, lens)
+    if valid is not None:  # the picture ends where the lens does
         return lens.widest
     rays = local.reshape(3, height, width)
     step = max((float(np.sqrt((np.diff(rays, axis=axis) ** 2).sum(0)).max(initial=0)) for axis in (1, 2)), default=0)

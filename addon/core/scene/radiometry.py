@@ -1,4 +1,4 @@
-"""How the codes that a camera stored tell radiance: its response, a frame's exposure and white balance, vignetting."""
+"""How a camera's codes relate to radiance: its response, a frame's exposure and white balance, vignetting."""
 
 from dataclasses import dataclass
 
@@ -28,8 +28,8 @@ class Radiometry:
 
     def radiance(self, codes: np.ndarray, r2: np.ndarray) -> np.ndarray:
         """Linear radiance ((..., 3) float32) of codes in 0...1 ((..., 3)) at squared distances `r2` ((...))."""
-        at = np.linspace(0, 1, self.response.shape[1])
-        linear = np.stack([np.interp(codes[..., c], at, self.response[c]) for c in range(3)], -1)
+        codes_of_response = np.linspace(0, 1, self.response.shape[1])
+        linear = np.stack([np.interp(codes[..., c], codes_of_response, self.response[c]) for c in range(3)], -1)
         return (linear / (vignetting(r2, self.falloff)[..., None] * self.gain)).astype(np.float32)
 
 

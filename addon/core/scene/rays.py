@@ -71,7 +71,7 @@ class RayScene:
         self._run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))  # builds the tree now, in one thread
 
     def fit(self, extent: float) -> None:
-        """Let origins lie as near to their surface as a room of so many metres needs it, where the mesh goes on."""
+        """Let origins lie as near to their surface as a room of so many metres needs it, where the mesh goes beyond."""
         self.offset = max(RELATIVE_OFFSET * min(self.diagonal, 2 * extent), self._coarse)
 
     def _run(self, origins, directions, **options):
@@ -91,20 +91,20 @@ class RayScene:
         if len(directions) == 0:
             none = np.zeros(0, np.float32)
             return Hits(np.zeros(0, np.int32), none, none, none)
-        found = self._run(origins, directions, output=True)
-        triangle = found["primID"]
-        hits = Hits(triangle, found["u"], found["v"], np.where(triangle < 0, np.float32(np.inf), found["tfar"]))
+        result = self._run(origins, directions, output=True)
+        triangle = result["primID"]
+        hits = Hits(triangle, result["u"], result["v"], np.where(triangle < 0, np.float32(np.inf), result["tfar"]))
         return hits if self._sides is None else self._by_side(hits, directions, *self._sides)
 
     @staticmethod
     def _by_side(hits: Hits, directions: np.ndarray, back: np.ndarray, normal: np.ndarray) -> Hits:
         """The hits credited to the side of a sheet that the rays came from."""
         sheet = np.flatnonzero((hits.triangle >= 0) & (back[hits.triangle] >= 0))
-        met = hits.triangle[sheet]
-        at = sheet[np.einsum("ij,ij->i", directions[sheet], normal[met]) > 0]
+        triangle_hit = hits.triangle[sheet]
+        from_behind = sheet[np.einsum("ij,ij->i", directions[sheet], normal[triangle_hit]) > 0]
         triangle, u, v = hits.triangle.copy(), hits.u.copy(), hits.v.copy()
-        triangle[at] = back[triangle[at]]
-        u[at], v[at] = hits.v[at], hits.u[at]  # the other winding
+        triangle[from_behind] = back[triangle[from_behind]]
+        u[from_behind], v[from_behind] = hits.v[from_behind], hits.u[from_behind]  # the other winding
         return Hits(triangle, u, v, hits.distance)
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:

@@ -42,8 +42,8 @@ class Samples:
     @staticmethod
     def none() -> Samples:
         """Where there are no frames."""
-        whole, values = np.zeros(0, np.int32), np.zeros((0, 3), np.float32)
-        return Samples(whole, whole, values, values, np.zeros(0, bool), np.zeros(0, np.float32))
+        integers, values = np.zeros(0, np.int32), np.zeros((0, 3), np.float32)
+        return Samples(integers, integers, values, values, np.zeros(0, bool), np.zeros(0, np.float32))
 
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
@@ -65,7 +65,7 @@ class SampleCollector:
     Parameters
     ----------
     triangle_normal : (t, 3) float32, optional
-        The mesh's, where views are handed over that tell how the surface turns within their pixels.
+        The mesh's, where views are handed over that show how the surface turns within their pixels.
     """
 
     def __init__(self, atlas: Atlas, frames: int, seed: int, triangle_normal: np.ndarray | None = None):
@@ -76,12 +76,12 @@ class SampleCollector:
         self._seed = seed
         self._parts: list[Samples] = []
 
-    def add(self, frame: int, seen: Observations, view: FrameView | None = None) -> None:
+    def add(self, frame: int, observations: Observations, view: FrameView | None = None) -> None:
         """Take what `frame` saw; observations at depth edges show something else and are left out."""
-        keep = self._chosen[seen.element] & ((seen.tier == CLEAN) | (seen.tier == SATURATED))
+        keep = self._chosen[observations.element] & ((observations.tier == CLEAN) | (observations.tier == SATURATED))
         if self._keep < 1:
             keep &= np.random.default_rng([self._seed, frame]).random(len(keep)) < self._keep
-        element = seen.element[keep]
+        element = observations.element[keep]
         variance = np.zeros(len(element), np.float32)
         if view is not None and self._triangle_normal is not None:
             variance = normal_variance(view, self._atlas, element, self._triangle_normal)
@@ -89,16 +89,16 @@ class SampleCollector:
             Samples(
                 element,
                 np.full(len(element), frame, np.int32),
-                seen.radiance[keep],
-                seen.direction[keep],
-                seen.tier[keep] == SATURATED,
+                observations.radiance[keep],
+                observations.direction[keep],
+                observations.tier[keep] == SATURATED,
                 variance,
             )
         )
 
     def result(self) -> Samples:
         """All of it, ordered by element, then frame."""
-        names = [one.name for one in fields(Samples)]
-        together = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
-        order = np.lexsort((together["frame"], together["element"]))
-        return Samples(**{name: values[order] for name, values in together.items()})
+        names = [field.name for field in fields(Samples)]
+        columns = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
+        order = np.lexsort((columns["frame"], columns["element"]))
+        return Samples(**{name: values[order] for name, values in columns.items()})

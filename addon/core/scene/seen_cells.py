@@ -52,8 +52,8 @@ class SeenCells:
             triangle = hits.triangle[near]
             position = camera.centre + hits.distance[near, None] * directions[near]
             key = self._key(position, triangle, 0)
-            own = large[triangle]
-            pairs = np.unique(np.stack([triangle[own].astype(np.uint64), key[own]], 1), axis=0)
+            on_large = large[triangle]
+            pairs = np.unique(np.stack([triangle[on_large].astype(np.uint64), key[on_large]], 1), axis=0)
             return np.unique(triangle), np.unique(key), pairs
 
         triangles, keys, pairs = zip(*ordered_map(look, cameras, threads), strict=True)
@@ -73,13 +73,13 @@ class SeenCells:
 
     def seen(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
         """Whether points ((n, 3) float, of triangles (n,) int) lie where the frames look, (n,) bool."""
-        found = np.zeros(len(position), bool)
+        seen = np.zeros(len(position), bool)
         if len(self._cells):
             for part in blocks(len(position), ROWS):
                 key = self._key(position[part], triangle[part], 0)
-                at = np.minimum(np.searchsorted(self._cells, key), len(self._cells) - 1)
-                found[part] = self._cells[at] == key
-        return found
+                index = np.minimum(np.searchsorted(self._cells, key), len(self._cells) - 1)
+                seen[part] = self._cells[index] == key
+        return seen
 
     def area_met(self, triangle: np.ndarray) -> np.ndarray:
         """Surface of large triangles ((n,) int) that rays met, to a cell, (n,) float64, square metres."""
@@ -87,10 +87,12 @@ class SeenCells:
 
     def coarse_edge(self, position: np.ndarray, coarser: np.ndarray | float = 1.0) -> np.ndarray:
         """Edge of the coarse cell around points ((n, 3) float), (n,) float64, metres."""
-        away = np.maximum(np.maximum(self._low - position, position - self._high), 0)
-        far = SPARSE.angle * np.sqrt(np.einsum("ij,ij->i", away, away)) / self._edge
+        distance = np.maximum(np.maximum(self._low - position, position - self._high), 0)
+        by_distance = SPARSE.angle * np.sqrt(np.einsum("ij,ij->i", distance, distance)) / self._edge
         # Steps of two: cells of neighbouring places are mostly of one size.
-        return self._edge * np.exp2(np.ceil(np.log2(coarser * np.maximum(far, SPARSE.coarse / SPARSE.cell)) - 1e-9))
+        return self._edge * np.exp2(
+            np.ceil(np.log2(coarser * np.maximum(by_distance, SPARSE.coarse / SPARSE.cell)) - 1e-9)
+        )
 
     def coarse(self, position: np.ndarray, triangle: np.ndarray, coarser: np.ndarray | float = 1.0) -> np.ndarray:
         """Number of the coarse cell of each point ((n, 3) float, of triangles (n,) int), (n,) uint64.
@@ -98,11 +100,13 @@ class SeenCells:
         Cells are `coarser` ((n,) float, or one for all) times as wide as usual.
         """
         coarser = np.broadcast_to(coarser, len(position))
-        found = np.empty(len(position), np.uint64)
+        number = np.empty(len(position), np.uint64)
         for part in blocks(len(position), ROWS):
             edge = self.coarse_edge(position[part], coarser[part])
-            found[part] = self._key(position[part], triangle[part], np.log2(edge / self._edge).round().astype(np.int64))
-        return found
+            number[part] = self._key(
+                position[part], triangle[part], np.log2(edge / self._edge).round().astype(np.int64)
+            )
+        return number
 
 
 def sides(mesh: Mesh) -> np.ndarray:
@@ -119,11 +123,11 @@ def sides(mesh: Mesh) -> np.ndarray:
 def cell_numbers(place: np.ndarray, label: np.ndarray, level: np.ndarray | int) -> np.ndarray:
     """A number for each cell's place ((n, 3) int), label and size ((n,) int), (n,) uint64: almost surely its own."""
     with np.errstate(over="ignore"):
-        found = _numbers(place) + label.astype(np.uint64) * _STEPS[3]
-        return found + np.asarray(level).astype(np.uint64) * _STEPS[4]
+        number = _numbers(place) + label.astype(np.uint64) * _STEPS[3]
+        return number + np.asarray(level).astype(np.uint64) * _STEPS[4]
 
 
 def _numbers(place: np.ndarray) -> np.ndarray:
-    """A number for each place ((n, 3) int) on a grid, (n,) uint64: different for any two, as good as surely."""
+    """A number for each place ((n, 3) int) on a grid, (n,) uint64: almost surely different for any two."""
     with np.errstate(over="ignore"):
         return (place.astype(np.uint64) * _STEPS[:3]).sum(1, dtype=np.uint64)

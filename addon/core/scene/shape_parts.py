@@ -1,6 +1,6 @@
-"""Objects for a mesh that was fused from depth and tells of none: its large planes, and pieces between its creases.
+"""Objects for a mesh that was fused from depth and names none: its large planes, and pieces between its creases.
 
-A room that a depth camera or a phone scanned hangs together, and has one material only if nothing takes it apart. Here
+A room that a depth camera or a phone scanned is one connected mesh, and gets one material unless it is segmented. Here
 its shape does: large planes first (floor, ceiling, walls, table tops), then what is smooth, joined over convex edges
 (two things that touch meet in a concave one: Hoffman and Richards, 1984). In three rooms fused from noisy depth 83 to
 92 % of the surface lay in a part whose majority was that object.
@@ -97,59 +97,59 @@ class _Faces:
         return self._angles(self.normal) * np.where(outward < 0, 1, -1)
 
     def pieces(self, joined: np.ndarray) -> np.ndarray:
-        """The piece of each triangle, where the pairs that are `joined` hang together, (t,) int from 0."""
+        """Connected components of the triangles over the pairs that are `joined`, (t,) int from 0."""
         return components(self.a[joined], self.b[joined], self.count)
 
     def largest(self, chosen: np.ndarray) -> np.ndarray:
-        """Those of some triangles ((k,) int) that hang together and have the most surface, (n,) int."""
+        """The connected component with the largest area among the triangles `chosen` ((k,) int), (n,) int."""
         if not len(chosen):
             return chosen
-        number = np.full(self.count, -1)
-        number[chosen] = np.arange(len(chosen))
-        a, b = number[self.a], number[self.b]
-        both = (a >= 0) & (b >= 0)
-        piece = components(a[both], b[both], len(chosen))
+        local_index = np.full(self.count, -1)
+        local_index[chosen] = np.arange(len(chosen))
+        a, b = local_index[self.a], local_index[self.b]
+        joined = (a >= 0) & (b >= 0)
+        piece = components(a[joined], b[joined], len(chosen))
         return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
 
 
 def _planes(faces: _Faces, gap: float) -> list[Plane]:
     """Large planes, the best supported first: the densest cell of (direction, offset), then least squares."""
-    least = PARTS.plane * faces.area.sum()
-    ways = fibonacci(PARTS.directions)
-    nearest = cKDTree(ways).query(faces.normal)[1]
-    offset = np.floor((faces.centre * ways[nearest]).sum(1) / (2 * gap)).astype(np.int64)
+    minimum_area = PARTS.plane * faces.area.sum()
+    directions = fibonacci(PARTS.directions)
+    nearest = cKDTree(directions).query(faces.normal)[1]
+    offset = np.floor((faces.centre * directions[nearest]).sum(1) / (2 * gap)).astype(np.int64)
     cell = np.unique(np.stack([nearest, offset], 1), axis=0, return_inverse=True)[1].ravel()
-    free, found = np.ones(faces.count, bool), []
+    free, planes = np.ones(faces.count, bool), []
     support = np.bincount(cell, faces.area)
-    while support.max() > PARTS.seed * least:
+    while support.max() > PARTS.seed * minimum_area:
         seed = np.flatnonzero((cell == support.argmax()) & free)
         plane = _plane_at(faces, seed, np.flatnonzero(free), gap)
-        large = plane is not None and faces.area[plane.faces].sum() >= least
+        large = plane is not None and faces.area[plane.faces].sum() >= minimum_area
         if plane is not None and large and not _is_curved(faces, plane.faces, plane.normal):
-            found.append(plane)
+            planes.append(plane)
             free[plane.faces] = False
         else:
             free[seed] = False  # no plane's seed any more, and none's triangles
         support = np.bincount(cell, faces.area * free, len(support))
-    return found
+    return planes
 
 
 def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> Plane | None:
-    """The plane through some triangles, and which of the `free` ones ((k,) int) lie in it and hang together."""
-    own = seed
+    """The plane through the triangles `seed`, with the `free` ones ((k,) int) that lie in it and are connected."""
+    members = seed
     for _ in range(PARTS.fits):
-        weight = faces.area[own]
-        point = np.average(faces.centre[own], 0, weight)
-        arm = (faces.centre[own] - point) * np.sqrt(weight)[:, None]
-        normal = np.linalg.eigh(arm.T @ arm)[1][:, 0]
-        normal *= np.sign(normal @ (weight @ faces.normal[own])) or 1
+        weight = faces.area[members]
+        point = np.average(faces.centre[members], 0, weight)
+        weighted_offset = (faces.centre[members] - point) * np.sqrt(weight)[:, None]
+        normal = np.linalg.eigh(weighted_offset.T @ weighted_offset)[1][:, 0]
+        normal *= np.sign(normal @ (weight @ faces.normal[members])) or 1
         near = free[np.abs((faces.centre[free] - point) @ normal) < gap]
-        alike = near[faces.normal[near] @ normal > np.cos(PARTS.tilt)]
-        own = faces.largest(alike)
-        if not len(own):
+        aligned = near[faces.normal[near] @ normal > np.cos(PARTS.tilt)]
+        members = faces.largest(aligned)
+        if not len(members):
             return None
-    # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not hang together.
-    return Plane(normal, point, alike if _bounds(faces, point, normal, gap) else own)
+    # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not be connected.
+    return Plane(normal, point, aligned if _bounds(faces, point, normal, gap) else members)
 
 
 def _bounds(faces: _Faces, point: np.ndarray, normal: np.ndarray, gap: float) -> bool:
@@ -158,13 +158,13 @@ def _bounds(faces: _Faces, point: np.ndarray, normal: np.ndarray, gap: float) ->
     return bool(faces.area[inside].sum() >= PARTS.outer * faces.area.sum())
 
 
-def _is_curved(faces: _Faces, own: np.ndarray, normal: np.ndarray) -> bool:
-    """Whether the triangles `own` are a piece of something round: their normals wander, and it goes on beyond them."""
-    wander = np.median(np.arccos(np.clip(faces.normal[own] @ normal, -1, 1)))
-    inside = np.bincount(own, minlength=faces.count) > 0
+def _is_curved(faces: _Faces, members: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether the triangles `members` lie on a curved surface: their normals vary, and it continues beyond them."""
+    deviation = np.median(np.arccos(np.clip(faces.normal[members] @ normal, -1, 1)))
+    inside = np.bincount(members, minlength=faces.count) > 0
     border = inside[faces.a] != inside[faces.b]
-    goes_on = faces.length[border & faces.smooth].sum() > faces.length[border].sum() / 2
-    return bool(goes_on and wander > PARTS.smooth / 2)
+    continues = faces.length[border & faces.smooth].sum() > faces.length[border].sum() / 2
+    return bool(continues and deviation > PARTS.smooth / 2)
 
 
 def _borders(faces: _Faces, piece: np.ndarray, weight: np.ndarray) -> sparse.csr_matrix:
@@ -179,12 +179,12 @@ def _borders(faces: _Faces, piece: np.ndarray, weight: np.ndarray) -> sparse.csr
 def _without_crumbs(faces: _Faces, piece: np.ndarray) -> np.ndarray:
     """The pieces again, each that is small a part of the neighbour with which it shares the longest border.
 
-    What hangs together with nothing joins what is nearest.
+    What is connected with nothing joins what is nearest.
     """
-    least = SURFACE.tiny * faces.area.sum()
+    minimum_area = SURFACE.tiny * faces.area.sum()
     while True:
         border = _borders(faces, piece, faces.length)
-        crumb, alone = np.bincount(piece, faces.area) < least, np.diff(border.indptr) == 0
+        crumb, alone = np.bincount(piece, faces.area) < minimum_area, np.diff(border.indptr) == 0
         if not (crumb & ~alone).any():
             piece = to_nearest(np.where((crumb & alone)[piece], -1, piece), faces.centre)
             return np.unique(piece, return_inverse=True)[1].ravel()
@@ -229,20 +229,20 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
         label[plane.faces] = k
     x, y = label[faces.a], label[faces.b]
     piece = _without_crumbs(faces, faces.pieces(np.where((x >= 0) | (y >= 0), x == y, faces.smooth)))
-    own = [int(np.bincount(piece[plane.faces], faces.area[plane.faces]).argmax()) for plane in planes]
+    piece_of_plane = [int(np.bincount(piece[plane.faces], faces.area[plane.faces]).argmax()) for plane in planes]
     flat = np.zeros(piece.max() + 1, bool)
-    flat[own] = True
+    flat[piece_of_plane] = True
     first = np.unique(piece, return_index=True)[1]  # a triangle of each piece, to find it again
     joined = _over_convex_edges(faces, piece, flat)
     order = np.argsort(-np.bincount(joined, faces.area), kind="stable")
     rank = np.empty(len(order), int)
     rank[order] = np.arange(len(order))
     part = rank[joined]
-    told = tuple(
-        replace(plane, part=int(part[first[k]]), name=_name(plane, faces, gap))
-        for k, plane in zip(own, planes, strict=True)
+    named_planes = tuple(
+        replace(plane, part=int(part[first[plane_piece]]), name=_name(plane, faces, gap))
+        for plane_piece, plane in zip(piece_of_plane, planes, strict=True)
     )
-    return Parts(part, {plane.part: plane.name for plane in told if plane.name}, told)
+    return Parts(part, {plane.part: plane.name for plane in named_planes if plane.name}, named_planes)
 
 
 def plane_gap(points: np.ndarray) -> float:
@@ -251,7 +251,7 @@ def plane_gap(points: np.ndarray) -> float:
 
 
 def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
-    """Objects for a mesh that tells of none: its connected parts, or, where most of it hangs together, its shape's.
+    """Objects for a mesh that names none: its connected parts, or, where most of it is connected, parts by its shape.
 
     Parameters
     ----------

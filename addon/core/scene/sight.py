@@ -41,7 +41,7 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class Shown:
+class RadianceBeyond:
     """What frames show of what no mesh holds, and of the mesh.
 
     Attributes
@@ -61,16 +61,16 @@ class Shown:
     views: float
 
 
-def _seen(camera: Camera, points: np.ndarray, normals: np.ndarray):
-    """Those of the points ((n, 3)) that face a camera and lie in its picture; their pixels, directions, distances."""
-    away = points - camera.centre
-    distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+def _visible(camera: Camera, points: np.ndarray, normals: np.ndarray):
+    """Points ((n, 3)) that face a camera and lie within its image: indices, pixels, directions, distances."""
+    offset = points - camera.centre
+    distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
     xy, depth = camera.project(points)
-    facing = -(away * normals).sum(1) >= VISIBILITY.min_cosine * distance
+    facing = -(offset * normals).sum(1) >= VISIBILITY.min_cosine * distance
     inside = facing & (depth > 0) & (xy >= 0).all(1) & (xy < (camera.width, camera.height)).all(1)
-    at = np.flatnonzero(inside)
-    x, y = xy[at].astype(np.int64).T
-    return at, y * camera.width + x, (away[at] / distance[at, None]).astype(np.float32), distance[at]
+    index = np.flatnonzero(inside)
+    x, y = xy[index].astype(np.int64).T
+    return index, y * camera.width + x, (offset[index] / distance[index, None]).astype(np.float32), distance[index]
 
 
 def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, normals: np.ndarray, gap: float) -> Sight:
@@ -81,14 +81,14 @@ def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, nor
     through, out = np.zeros(len(points), int), np.zeros(len(points), int)
     rows: list[tuple[np.ndarray, ...]] = []
     for number, camera in enumerate(cameras):
-        at, pixel, direction, distance = _seen(camera, points, normals)
+        index, pixel, direction, distance = _visible(camera, points, normals)
         hits = scene.intersect(camera.centre, direction)
         escapes = hits.triangle < 0
         beyond = np.where(escapes, 0, hits.distance) - distance
-        height = beyond * (direction * normals[at]).sum(1)  # of what is met over the plane
-        through[at[~escapes & (height < -gap)]] += 1
-        out[at[escapes]] += 1
-        rows.append((at[escapes], np.full(escapes.sum(), number), pixel[escapes], direction[escapes],
+        height = beyond * (direction * normals[index]).sum(1)  # of what is met over the plane
+        through[index[~escapes & (height < -gap)]] += 1
+        out[index[escapes]] += 1
+        rows.append((index[escapes], np.full(escapes.sum(), number), pixel[escapes], direction[escapes],
                      distance[escapes]))  # fmt: skip
     return Sight(through, out, *(np.concatenate(column) for column in zip(*rows, strict=True)))
 
@@ -96,7 +96,7 @@ def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, nor
 def colours(
     frames: Sequence[Frame], read: Callable[[Frame], Pixels], sight: Sight, scene: RayScene, points: np.ndarray,
     normals: np.ndarray, gap: float
-) -> Shown:  # fmt: skip
+) -> RadianceBeyond:  # fmt: skip
     """What frames show of what no mesh holds.
 
     Parameters
@@ -106,37 +106,39 @@ def colours(
     """
     value, clipped = np.full((len(sight.place), 3), np.nan), np.zeros(len(sight.place), bool)
     used, views = np.unique(sight.frame), np.zeros(len(points))
-    shown = np.full((len(used), len(points), 3), np.nan)
+    log_radiance = np.full((len(used), len(points), 3), np.nan)
     for number, frame in enumerate(frames):
-        at, pixel, direction, distance = _seen(frame.camera, points, normals)
-        met = np.abs(scene.intersect(frame.camera.centre, direction).distance - distance) < gap
-        views[at[met]] += 1
+        index, pixel, direction, distance = _visible(frame.camera, points, normals)
+        hit = np.abs(scene.intersect(frame.camera.centre, direction).distance - distance) < gap
+        views[index[hit]] += 1
         row = int(np.searchsorted(used, number))
         if row == len(used) or used[row] != number:
             continue
         pixels = read(frame)
         log = np.log(np.maximum(pixels.radiance.reshape(-1, 3), FLOOR))
-        bad = ~pixels.valid.ravel() | pixels.saturated.ravel()
-        at, pixel = at[met], pixel[met]
-        shown[row, at] = np.where(bad[pixel, None], np.nan, log[pixel])
-        own = np.flatnonzero(sight.frame == number)
-        value[own] = np.where(pixels.valid.ravel()[sight.pixel[own], None], log[sight.pixel[own]], np.nan)
-        clipped[own] = pixels.saturated.ravel()[sight.pixel[own]]
+        invalid = ~pixels.valid.ravel() | pixels.saturated.ravel()
+        index, pixel = index[hit], pixel[hit]
+        log_radiance[row, index] = np.where(invalid[pixel, None], np.nan, log[pixel])
+        observations = np.flatnonzero(sight.frame == number)
+        value[observations] = np.where(
+            pixels.valid.ravel()[sight.pixel[observations], None], log[sight.pixel[observations]], np.nan
+        )
+        clipped[observations] = pixels.saturated.ravel()[sight.pixel[observations]]
     gain = np.zeros((len(used), 1, 3))
     for _ in range(3):
-        level = _median(shown - gain, 0)
-        gain = np.nan_to_num(_median(shown - level, 1))
+        level = _median(log_radiance - gain, 0)
+        gain = np.nan_to_num(_median(log_radiance - level, 1))
     value -= gain[np.searchsorted(used, sight.frame), 0]
-    known = level.mean(-1)[np.isfinite(level).all(-1)]
-    bright = float(np.quantile(known, LEVELS.nearly_all)) if len(known) else np.nan
-    few = float(np.quantile(views[views > 0], 1 - LEVELS.nearly_all)) if views.any() else 0.0
-    return Shown(value, clipped, bright, few)
+    levels = level.mean(-1)[np.isfinite(level).all(-1)]
+    bright = float(np.quantile(levels, LEVELS.nearly_all)) if len(levels) else np.nan
+    few_views = float(np.quantile(views[views > 0], 1 - LEVELS.nearly_all)) if views.any() else 0.0
+    return RadianceBeyond(value, clipped, bright, few_views)
 
 
 def _median(values: np.ndarray, axis: int) -> np.ndarray:
-    """Median along an axis, which stays; NaN counts for nothing, and is what there is none of."""
-    known = np.isfinite(values).any(axis, keepdims=True)
-    return np.where(known, np.nanmedian(np.where(known, values, 0), axis, keepdims=True), np.nan)
+    """Median along an axis, which is kept, ignoring NaN; NaN where all are."""
+    finite = np.isfinite(values).any(axis, keepdims=True)
+    return np.where(finite, np.nanmedian(np.where(finite, values, 0), axis, keepdims=True), np.nan)
 
 
 def between_frames(value: np.ndarray, group: np.ndarray, frame: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""What some of a frame's pixels meet: enough to tell which surface the frames look at, and how closely."""
+"""What some of a frame's pixels meet: enough to know which surface the frames look at, and how closely."""
 
 import numpy as np
 
@@ -19,9 +19,9 @@ def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -
     """
     y, x = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
     pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
-    directions, led = camera.rays(pixels)
-    if not led.all():
-        pixels, directions = pixels[led], directions[led]
+    directions, has_ray = camera.rays(pixels)
+    if not has_ray.all():
+        pixels, directions = pixels[has_ray], directions[has_ray]
     hits = scene.intersect(camera.centre, directions)
     met = np.flatnonzero(hits.triangle >= 0)
     return pixels[met], directions[met], hits.part(met)

@@ -51,18 +51,18 @@ class Sparse:
         self._mesh, self._cells = mesh, cells
         corner = mesh.vertices[mesh.triangles]
         self._corner, self._middle = corner, corner.mean(1)
-        every = np.arange(len(mesh.triangles))
+        all_triangles = np.arange(len(mesh.triangles))
         seen = cells.met.copy()
         for point in (self._middle, *corner.transpose(1, 0, 2)):
-            seen |= cells.seen(point, every)
+            seen |= cells.seen(point, all_triangles)
         _, area = mesh.geometry
         side = np.sqrt(area)
         # Half a cell, so that a triangle apart is about as fine as the cells are.
         edge = np.where(seen, texel, cells.coarse_edge(self._middle) / 2)
         edge = np.maximum(edge, np.where(seen, 0, side / SPARSE.large))
         large = np.flatnonzero(seen & (side > SPARSE.large * texel))
-        barely = texel * side[large] / np.sqrt(SPARSE.seen_part * cells.area_met(large))
-        edge[large] = np.where(barely > 2 * texel, barely, texel)
+        coarse = texel * side[large] / np.sqrt(SPARSE.seen_part * cells.area_met(large))
+        edge[large] = np.where(coarse > 2 * texel, coarse, texel)
         self.edge = edge
         longest = np.max([np.linalg.norm(corner[:, k] - corner[:, k - 1], axis=1) for k in range(3)], 0)
         self._small = longest <= np.where(seen, SPARSE.fine * texel, 2 * cells.coarse_edge(self._middle))
@@ -103,14 +103,14 @@ def flattened(corner: np.ndarray) -> np.ndarray:
     corner = corner.astype(np.float64)
     length = np.stack([np.linalg.norm(corner[:, (k + 1) % 3] - corner[:, k], axis=1) for k in range(3)], 1)
     first = length.argmax(1)
-    at = np.arange(len(corner))
-    a, b, c = (corner[at, (first + k) % 3] for k in range(3))
-    along = (b - a) / np.maximum(length[at, first], 1e-30)[:, None]
+    index = np.arange(len(corner))
+    a, b, c = (corner[index, (first + k) % 3] for k in range(3))
+    along = (b - a) / np.maximum(length[index, first], 1e-30)[:, None]
     x = np.einsum("ij,ij->i", c - a, along)
     y = np.linalg.norm(c - a - x[:, None] * along, axis=1)
     result = np.zeros((len(corner), 3, 2))
-    result[at, (first + 1) % 3, 0] = length[at, first]
-    result[at, (first + 2) % 3] = np.stack([x, y], 1)
+    result[index, (first + 1) % 3, 0] = length[index, first]
+    result[index, (first + 2) % 3] = np.stack([x, y], 1)
     return result
 
 
@@ -167,17 +167,17 @@ def with_strip(
     step = SURFACE.step
     size, coarser = min(-(-int(np.ceil(edge)) // step) * step, largest), 1.0
     while True:
-        found = sparse.placed(size, coarser)
-        if size < largest and size - found.height < edge:
+        strip = sparse.placed(size, coarser)
+        if size < largest and size - strip.height < edge:
             size = min(size + step, largest)
-        elif size >= largest and found.height > SPARSE.highest * size:
+        elif size >= largest and strip.height > SPARSE.highest * size:
             coarser *= 2
         else:
             break
-    square = size - found.height
+    square = size - strip.height
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
-    others = np.ones(len(uv), bool)
-    others[found.triangle] = False
-    uv[others] = dense * (square / size)
-    uv[found.triangle] = (found.uv + (0, square)) / size
-    return uv, size, square, found.crumbs._replace(corner=found.crumbs.corner + (0, square))
+    is_dense = np.ones(len(uv), bool)
+    is_dense[strip.triangle] = False
+    uv[is_dense] = dense * (square / size)
+    uv[strip.triangle] = (strip.uv + (0, square)) / size
+    return uv, size, square, strip.crumbs._replace(corner=strip.crumbs.corner + (0, square))

@@ -33,9 +33,9 @@ class LitTiles:
     tile: np.ndarray
     uv: np.ndarray
 
-    def part(self, kept: np.ndarray) -> LitTiles:
+    def part(self, chosen: np.ndarray) -> LitTiles:
         """For some of the triangles ((t,) bool)."""
-        return replace(self, picture=self.picture[kept], tile=self.tile[kept], uv=self.uv[kept])
+        return replace(self, picture=self.picture[chosen], tile=self.tile[chosen], uv=self.uv[chosen])
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,6 @@ class LitTexture:
     uv: np.ndarray
     transfer: str
 
-    def part(self, kept: np.ndarray) -> LitTexture:
+    def part(self, chosen: np.ndarray) -> LitTexture:
         """For some of the triangles ((t,) bool)."""
-        return replace(self, picture=self.picture[kept], uv=self.uv[kept])
+        return replace(self, picture=self.picture[chosen], uv=self.uv[chosen])

@@ -48,7 +48,7 @@ class Surface:
     def uv(self) -> np.ndarray:
         """Atlas coordinates in the corner order of the capture's own mesh; then those of the second sides, turned
         alike: (t, 3, 2) float32."""
-        return turned(self.atlas.uv, _every(self.mesh, self.sign))
+        return turned(self.atlas.uv, _with_back_signs(self.mesh, self.sign))
 
     @cached_property
     def shown_uv(self) -> np.ndarray:
@@ -84,22 +84,22 @@ def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return result
 
 
-def without_triangles(mesh: Mesh, which: np.ndarray) -> Mesh:
+def without_triangles(mesh: Mesh, removed: np.ndarray) -> Mesh:
     """What an unwrap needs of a mesh's other triangles; second sides count as any."""
-    left = np.ones(len(mesh.triangles), bool)
-    left[which] = False
-    uv = None if mesh.uv is None else mesh.uv[left]
-    return Mesh(mesh.vertices, mesh.triangles[left], mesh.object_id[left], uv=uv)
+    remaining = np.ones(len(mesh.triangles), bool)
+    remaining[removed] = False
+    uv = None if mesh.uv is None else mesh.uv[remaining]
+    return Mesh(mesh.vertices, mesh.triangles[remaining], mesh.object_id[remaining], uv=uv)
 
 
-def _every(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
+def _with_back_signs(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
     """The signs of a mesh's first sides, and the same for its second ones."""
     return sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
 
 
 def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
     """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first."""
-    sign = _every(mesh, sign)
+    sign = _with_back_signs(mesh, sign)
     uv = None if mesh.uv is None else turned(mesh.uv, sign)
     return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
 
@@ -161,7 +161,7 @@ def build_surface(
     texel = texel_size or sides.footprint / detail
     cells = SeenCells(towards, scene, cameras, texel, threads) if cameras and coarse_unseen else None
     uv, size, edge, crumbs = _laid_out(mesh, unwrap, texel, largest, cells)
-    elements = find_elements(towards, turned(uv, _every(mesh, sides.sign)), size, cells, crumbs, threads)
+    elements = find_elements(towards, turned(uv, _with_back_signs(mesh, sides.sign)), size, cells, crumbs, threads)
     return from_uv(mesh, sides.sign, uv, size, edge, elements, scene=scene)
 
 
@@ -170,13 +170,13 @@ def _laid_out(
 ) -> tuple[np.ndarray, int, float, Crumbs | None]:
     """Atlas coordinates, the atlas's edge in texels, edge of a texel in metres, and what shares texels."""
     sparse = Sparse(mesh, cells, texel) if cells is not None and takes_parts(unwrap) else None
-    part = mesh if sparse is None or not len(sparse.triangle) else without_triangles(mesh, sparse.triangle)
-    _, area = part.geometry
-    uv = unwrap(part, atlas_size(float(area.sum()), texel, largest))
+    dense = mesh if sparse is None or not len(sparse.triangle) else without_triangles(mesh, sparse.triangle)
+    _, area = dense.geometry
+    uv = unwrap(dense, atlas_size(float(area.sum()), texel, largest))
     # The islands' true scale sets the size that makes a texel as large as wished.
-    scale = max(uv_scale(part, uv), 1e-12)
+    scale = max(uv_scale(dense, uv), 1e-12)
     edge = 1 / max(texel * scale, 1e-12)
-    if sparse is not None and part is not mesh:
+    if sparse is not None and dense is not mesh:
         uv, size, square, crumbs = with_strip(mesh, sparse, uv, edge, _whole_steps(largest, largest))
         return uv, size, 1 / (scale * square), crumbs
     size = _whole_steps(edge, largest)
@@ -198,7 +198,7 @@ def from_uv(
     `known` is what was found of the elements before; so is `scene`, if given, of the rays against the mesh.
     """
     towards = facing(mesh, sign)
-    atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size, known)
+    atlas = make_atlas(towards, turned(uv, _with_back_signs(mesh, sign)), size, known)
     scene = scene or RayScene(towards.vertices, towards.triangles, towards.backs)
     low, high = atlas.box
     scene.fit(float(np.linalg.norm(high - low)))

@@ -16,15 +16,15 @@ T = TypeVar("T", bound=Callable)
 
 
 def of_parts(unwrap: T) -> T:
-    """Marks an unwrap that may be asked for some of a mesh's triangles alone."""
+    """Marks an unwrap that may be called with some of a mesh's triangles alone."""
     vars(unwrap)["of_parts"] = True
     return unwrap
 
 
 def takes_parts(unwrap: Unwrap) -> bool:
-    """Whether it is marked so; not where it is told by number which triangles are a face of the artist's mesh."""
-    told = getattr(unwrap, "keywords", {})
-    return getattr(getattr(unwrap, "func", unwrap), "of_parts", False) and told.get("polygons") is None
+    """Whether it is marked so; not where it is given the faces of the artist's mesh by the number of each triangle."""
+    keywords = getattr(unwrap, "keywords", {})
+    return getattr(getattr(unwrap, "func", unwrap), "of_parts", False) and keywords.get("polygons") is None
 
 
 def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
@@ -49,9 +49,9 @@ def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
         )
     if first == len(uv):
         return uv
-    apart = uv / 2
-    apart[first:, :, 0] += 0.5
-    return apart
+    side_by_side = uv / 2
+    side_by_side[first:, :, 0] += 0.5
+    return side_by_side
 
 
 @of_parts
@@ -69,18 +69,18 @@ def by_xatlas(mesh: Mesh, size: int) -> np.ndarray:
         raise BadInputError(f"The Python package 'xatlas' is missing; {OTHERWISE}.") from error
     # Vertices are split between objects: a chart then never spans two of them.
     label = mesh.object_id[:, None].astype(np.int64) * len(mesh.vertices) + mesh.triangles
-    names, corners = np.unique(label.ravel(), return_inverse=True)
+    unique_labels, corners = np.unique(label.ravel(), return_inverse=True)
     atlas = xatlas.Atlas()
     atlas.add_mesh(
-        mesh.vertices[names % len(mesh.vertices)].astype(np.float32), corners.reshape(-1, 3).astype(np.uint32)
+        mesh.vertices[unique_labels % len(mesh.vertices)].astype(np.float32), corners.reshape(-1, 3).astype(np.uint32)
     )
     packing = xatlas.PackOptions()
     packing.resolution, packing.padding = size, SURFACE.margin
     atlas.generate(xatlas.ChartOptions(), packing)
     _, triangles, uv = atlas[0]
     edge = max(atlas.width, atlas.height, 1)  # its units are the two edges, which may differ
-    laid = uv[triangles] * np.array([atlas.width / edge, atlas.height / edge], np.float32)
-    return np.clip(np.nan_to_num(laid), 0, 1).astype(np.float32)
+    coordinates = uv[triangles] * np.array([atlas.width / edge, atlas.height / edge], np.float32)
+    return np.clip(np.nan_to_num(coordinates), 0, 1).astype(np.float32)
 
 
 OTHERWISE = "install Blender's bpy or xatlas (pip install 'scan-relight[blender]' or 'scan-relight[unwrap]')"

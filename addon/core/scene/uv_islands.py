@@ -1,4 +1,4 @@
-"""Islands of a texture layout: which triangles hang together, and cutting those that waste the square."""
+"""Islands of a texture layout: which triangles are connected, and cutting those that waste the square."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -30,7 +30,7 @@ def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
 
 
 def components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    """The piece that each of `count` nodes is of where pairs `a`, `b` ((p,) int) hang together, (count,) int from 0."""
+    """The connected component of each of `count` nodes, over the pairs `a`, `b` ((p,) int), (count,) int from 0."""
     graph = coo_matrix((np.ones(len(a), bool), (a, b)), (count, count))
     return connected_components(graph, directed=False)[1]
 
@@ -51,9 +51,9 @@ def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarra
     """
     if label is not None:
         corners = corners + label[:, None] * (corners.max(initial=0) + 1)
-    names, node = np.unique(corners.ravel(), return_inverse=True)
+    nodes, node = np.unique(corners.ravel(), return_inverse=True)
     a, b, c = node.reshape(-1, 3).T
-    piece = components(np.r_[a, b], np.r_[b, c], len(names))[a]
+    piece = components(np.r_[a, b], np.r_[b, c], len(nodes))[a]
     return np.unique(piece, return_inverse=True)[1].reshape(-1)
 
 
@@ -94,26 +94,26 @@ def cut_sparse(
     face = np.arange(len(uv)) if face is None else face
     count = np.maximum(np.bincount(face), 1)
     centre = np.stack([(np.bincount(face, centre[:, k]) / count)[face] for k in (0, 1)], -1)
-    settled = np.zeros(len(uv), bool)
+    final = np.zeros(len(uv), bool)
     for _ in range(SURFACE.rounds):
         low, high = boxes(uv, island)
         width = (high - low).astype(np.float64)
         fill = np.bincount(island, area) / np.maximum(width.prod(1), 1e-12)
         count = np.bincount(island)
-        worth = (fill < SURFACE.full) & (width.min(1) > 4 * margin) & (count > 1)
-        chosen = np.flatnonzero(worth[island] & ~settled)
+        worth_cutting = (fill < SURFACE.full) & (width.min(1) > 4 * margin) & (count > 1)
+        chosen = np.flatnonzero(worth_cutting[island] & ~final)
         if not len(chosen):
             break
         piece, parent, cost = _halves(uv, corners, island, chosen, centre, width, margin)
         before = (width + 2 * margin).prod(1)
         better = np.bincount(parent, cost, len(width)) < 1.02 * before
         # A ring of a few long triangles gains nothing from one straight cut: take it apart.
-        apart = ~better & (fill < SURFACE.hopeless) & (count <= 64)
+        taken_apart = ~better & (fill < SURFACE.hopeless) & (count <= 64)
         accepted = better[island[chosen]]
-        settled[chosen[~accepted]] = True
+        final[chosen[~accepted]] = True
         finer = island.copy()
         finer[chosen[accepted]] = island.max() + 1 + piece[accepted]
-        single = chosen[apart[island[chosen]]]
+        single = chosen[taken_apart[island[chosen]]]
         finer[single] = finer.max() + 1 + face[single]
         island = np.unique(finer, return_inverse=True)[1].reshape(-1)
     return island

@@ -36,24 +36,24 @@ def overlapping_pairs(uv: np.ndarray, depth: float, island: np.ndarray | None = 
     extent = np.maximum((high - low).max(1), 2.0**-_LEVELS)
     level = np.clip(np.floor(-np.log2(extent)), 0, _LEVELS).astype(np.int64)
     group = np.zeros(len(uv), np.int64) if island is None else island.astype(np.int64)
-    everyone = np.arange(len(uv))
+    candidates = np.arange(len(uv))
     if island is not None:
-        everyone = everyone[np.bincount(group)[group] > 1]
-    found = [np.empty((0, 2), np.int64)]
-    for coarse in np.unique(level[everyone]):
-        owners = everyone[level[everyone] == coarse]
-        asking = everyone[level[everyone] >= coarse]
+        candidates = candidates[np.bincount(group)[group] > 1]
+    penetrating = [np.empty((0, 2), np.int64)]
+    for coarse in np.unique(level[candidates]):
+        owners = candidates[level[candidates] == coarse]
+        queries = candidates[level[candidates] >= coarse]
         key, owner = _cells(low, high, group, owners, int(coarse))
         order = np.argsort(key, kind="stable")
         key, owner = key[order], owner[order]
-        wanted, asker = _cells(low, high, group, asking, int(coarse))
-        first, last = np.searchsorted(key, wanted, "left"), np.searchsorted(key, wanted, "right")
-        for a, b in _joined(asker, owner, first, last):
+        query_key, query_owner = _cells(low, high, group, queries, int(coarse))
+        first, last = np.searchsorted(key, query_key, "left"), np.searchsorted(key, query_key, "right")
+        for a, b in _joined(query_owner, owner, first, last):
             # Of two at one level each finds the other; of two levels only the finer one asks.
             keep = (a < b) | (level[a] != level[b])
             a, b = a[keep], b[keep]
-            found.append(_penetrating(uv, low, high, a, b, depth))
-    pairs = np.concatenate(found)
+            penetrating.append(_penetrating(uv, low, high, a, b, depth))
+    pairs = np.concatenate(penetrating)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
@@ -106,13 +106,13 @@ def _cells(low, high, group, triangles, level):
     for x in (0, 1):
         for y in (0, 1):
             inside = (first[:, 0] + x <= last[:, 0]) & (first[:, 1] + y <= last[:, 1])
-            which = triangles[inside]
-            keys.append((group[which] * count + first[inside, 0] + x) * count + first[inside, 1] + y)
-            owners.append(which)
+            touching = triangles[inside]
+            keys.append((group[touching] * count + first[inside, 0] + x) * count + first[inside, 1] + y)
+            owners.append(touching)
     return np.concatenate(keys), np.concatenate(owners)
 
 
-def _joined(asker, owner, first, last):
+def _joined(query, owner, first, last):
     """All (asker, owner) of equal cells, in blocks that fit in memory."""
     counts = last - first
     block = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + 1, _CANDIDATES_AT_ONCE)[1:], "right")
@@ -120,7 +120,7 @@ def _joined(asker, owner, first, last):
     for start, stop in zip(edges[:-1], edges[1:], strict=True):
         n = counts[start:stop]
         offset = np.arange(n.sum()) - np.repeat(np.cumsum(n) - n, n)
-        yield np.repeat(asker[start:stop], n), owner[np.repeat(first[start:stop], n) + offset]
+        yield np.repeat(query[start:stop], n), owner[np.repeat(first[start:stop], n) + offset]
 
 
 def _penetrating(uv, low, high, a, b, depth):

@@ -99,9 +99,9 @@ def _shifts(height: int, width: int) -> Iterator[tuple[tuple[slice, slice], tupl
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
             if dy or dx:
-                own, other = zip(*((slice(max(-d, 0), n - max(d, 0)), slice(max(d, 0), n - max(-d, 0)))
+                pixel, neighbour = zip(*((slice(max(-d, 0), n - max(d, 0)), slice(max(d, 0), n - max(-d, 0)))
                                    for d, n in ((dy, height), (dx, width))))  # fmt: skip
-                yield own, other
+                yield pixel, neighbour
 
 
 def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -113,34 +113,40 @@ def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def view_frame(camera: Camera, mesh: Mesh, scene: RayScene) -> FrameView:
     """Trace the camera's pixels and find the depth edges."""
     height, width = camera.height, camera.width
-    led = np.ones((height, width), bool)  # to by a ray of the lens
+    has_ray = np.ones((height, width), bool)  # pixels that a ray of the lens leads to
     rays = np.empty((3, height, width), np.float32)
     triangle, object_id = np.empty((height, width), np.int32), np.empty((height, width), np.int32)
     u, v, distance = np.empty((3, height, width), np.float32)
     # By rows: all that is needed for a moment would be three times what is kept of a large frame.
     step = max(PIXELS_AT_ONCE // width, 1)
     for rows in blocks(height, step):
-        local, seen = rays_of_rows(camera, rows)
-        own = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
-        directions = np.ascontiguousarray(own.T)
+        local, valid = rays_of_rows(camera, rows)
+        world = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
+        directions = np.ascontiguousarray(world.T)
         hits = scene.intersect(camera.centre, directions)
-        rays[:, rows] = own.reshape(3, -1, width)
-        met = hits.triangle.reshape(-1, width)
-        if seen is not None:
-            led[rows], met = seen, np.where(seen, met, -1)
-        triangle[rows], object_id[rows] = met, np.where(met >= 0, mesh.object_id[met], -1)
+        rays[:, rows] = world.reshape(3, -1, width)
+        hit_triangle = hits.triangle.reshape(-1, width)
+        if valid is not None:
+            has_ray[rows], hit_triangle = valid, np.where(valid, hit_triangle, -1)
+        triangle[rows], object_id[rows] = hit_triangle, np.where(hit_triangle >= 0, mesh.object_id[hit_triangle], -1)
         u[rows], v[rows] = hits.u.reshape(-1, width), hits.v.reshape(-1, width)
-        distance[rows] = np.where(met >= 0, hits.distance.reshape(-1, width), np.float32(0))
-    object_id[~led] = NOTHING
+        distance[rows] = np.where(hit_triangle >= 0, hits.distance.reshape(-1, width), np.float32(0))
+    object_id[~has_ray] = NOTHING
     surface_id = np.minimum(object_id, 0) if mesh.whole else object_id
     clean = np.ones((height, width), bool)
     for rows in blocks(height, step):
         # With the rows beside them, whose pixels are neighbours.
-        wide = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        found = _clean(triangle[wide], surface_id[wide], distance[wide], rays[:, wide], mesh.geometry[0])
-        clean[rows] = found[rows.start - wide.start :][: rows.stop - rows.start]
-    clean &= led
-    object_id[~led] = -1
+        with_neighbours = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))
+        clean_rows = _clean(
+            triangle[with_neighbours],
+            surface_id[with_neighbours],
+            distance[with_neighbours],
+            rays[:, with_neighbours],
+            mesh.geometry[0],
+        )
+        clean[rows] = clean_rows[rows.start - with_neighbours.start :][: rows.stop - rows.start]
+    clean &= has_ray
+    object_id[~has_ray] = -1
     return FrameView(camera, rays, triangle, u, v, distance, object_id, clean, mesh.whole)
 
 
@@ -155,27 +161,29 @@ def _clean(
     offset = distance * _dot(normal, rays)
     tolerance = VISIBILITY.depth_tolerance * np.maximum(distance, 1e-6)
     clean = np.ones((height, width), bool)
-    for own, other in _shifts(height, width):
-        along = _dot(normal[:, own[0], own[1]], rays[:, other[0], other[1]])
+    for pixel, neighbour in _shifts(height, width):
+        along = _dot(normal[:, pixel[0], pixel[1]], rays[:, neighbour[0], neighbour[1]])
         # cross-multiplied, so that grazing planes divide by nothing
-        along *= distance[other]
-        along -= offset[own]
-        clean[own] &= (np.abs(along, out=along) <= tolerance[own]) & (object_id[other] == object_id[own])
+        along *= distance[neighbour]
+        along -= offset[pixel]
+        clean[pixel] &= (np.abs(along, out=along) <= tolerance[pixel]) & (object_id[neighbour] == object_id[pixel])
     return clean
 
 
-def _projected(camera: Camera, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixel positions x, y ((n,) float32) of points `away` ((3, n) float32) from the centre, and whether
+def _projected(camera: Camera, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixel positions x, y ((n,) float32) of points `offset` ((3, n) float32) from the centre, and whether
     they are seen."""
     right, up, back = camera.camera_to_world[:3, :3].T.tolist()
     if camera.lens is not None:
-        image, seen = camera.lens.project(np.stack([_dot(away, right), -_dot(away, up), -_dot(away, back)], -1))
+        image, visible = camera.lens.project(
+            np.stack([_dot(offset, right), -_dot(offset, up), -_dot(offset, back)], -1)
+        )
         pixels = np.clip(image * (camera.fx, camera.fy) + (camera.cx, camera.cy), -FAR, FAR).astype(np.float32)
-        return np.ascontiguousarray(pixels[:, 0]), np.ascontiguousarray(pixels[:, 1]), seen
-    depth = -_dot(away, back)
+        return np.ascontiguousarray(pixels[:, 0]), np.ascontiguousarray(pixels[:, 1]), visible
+    depth = -_dot(offset, back)
     inverse = 1 / np.maximum(depth, np.float32(1e-12))
-    x = float(camera.fx) * (_dot(away, right) * inverse) + float(camera.cx)
-    y = float(camera.cy) - float(camera.fy) * (_dot(away, up) * inverse)
+    x = float(camera.fx) * (_dot(offset, right) * inverse) + float(camera.cx)
+    y = float(camera.cy) - float(camera.fy) * (_dot(offset, up) * inverse)
     return x, y, depth > 0
 
 
@@ -186,15 +194,15 @@ def _bilinear(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     x0 = np.clip(x.astype(np.int32), 0, width - 2)  # towards zero: what lies outside is clipped all the same
     y0 = np.clip(y.astype(np.int32), 0, height - 2)
     a, b = np.clip(x - x0, 0, 1).astype(np.float32), np.clip(y - y0, 0, 1).astype(np.float32)
-    at = y0 * width + x0
-    beside, below, across = at + 1, at + width, at + (width + 1)
+    index = y0 * width + x0
+    right, below, diagonal = index + 1, index + width, index + (width + 1)
     not_a, not_b = 1 - a, 1 - b
     result = np.empty((len(x), 3), np.float32)
     for channel, plane in enumerate(np.ascontiguousarray(image.reshape(-1, 3).T)):
-        top = plane.take(at) * not_a
-        top += plane.take(beside) * a
+        top = plane.take(index) * not_a
+        top += plane.take(right) * a
         bottom = plane.take(below) * not_a
-        bottom += plane.take(across) * a
+        bottom += plane.take(diagonal) * a
         top *= not_b
         bottom *= b
         np.add(top, bottom, out=result[:, channel])
@@ -205,10 +213,10 @@ def _tiers(view: FrameView, pixels: Pixels) -> np.ndarray:
     """The tier of what each pixel shows, (height * width,) int8."""
     # A bilinear sample needs four good pixels, which only a clean neighbourhood grants; else the one pixel counts.
     usable = pixels.valid & ~pixels.saturated
-    around = usable.copy()
-    for own, other in _shifts(*usable.shape):
-        around[own] &= usable[other]
-    tier = np.where(view.clean & around, CLEAN, np.where(pixels.saturated, SATURATED, EDGE))
+    all_usable = usable.copy()
+    for pixel, neighbour in _shifts(*usable.shape):
+        all_usable[pixel] &= usable[neighbour]
+    tier = np.where(view.clean & all_usable, CLEAN, np.where(pixels.saturated, SATURATED, EDGE))
     return tier.astype(np.int8).ravel()
 
 
@@ -237,40 +245,40 @@ def observe(
     index = np.arange(len(atlas), dtype=np.int32) if elements is None else elements.astype(np.int32, copy=False)
 
     # Cheapest tests first: the frustum, then what the pixel shows, then the angle; rays last.
-    away = np.empty((3, len(index)), np.float32)
-    np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=away)
-    x, y, inside = _projected(camera, away)
+    offset = np.empty((3, len(index)), np.float32)
+    np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=offset)
+    x, y, inside = _projected(camera, offset)
     for position, extent in ((x, camera.width), (y, camera.height)):
         inside &= (position >= EDGE_MARGIN) & (position < extent - EDGE_MARGIN)
-    at = np.flatnonzero(inside)
-    x, y = x.take(at), y.take(at)
+    candidates = np.flatnonzero(inside)
+    x, y = x.take(candidates), y.take(candidates)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)
-    shown = np.where(pixels.valid, view.object_id, NOTHING).ravel()
-    same = shown.take(pixel) == atlas.object_id.take(index.take(at))
+    visible_id = np.where(pixels.valid, view.object_id, NOTHING).ravel()
+    same_object = visible_id.take(pixel) == atlas.object_id.take(index.take(candidates))
     if view.whole:
-        same |= view.clean.ravel().take(pixel) & (shown.take(pixel) >= 0)
-    keep = np.flatnonzero(same)
-    at = at.take(keep)
-    away = np.stack([plane.take(at) for plane in away])
-    distance = np.sqrt(_dot(away, away))
-    direction = away / -np.maximum(distance, np.float32(1e-12))
-    normal = atlas.normal.take(index.take(at), 0)
+        same_object |= view.clean.ravel().take(pixel) & (visible_id.take(pixel) >= 0)
+    keep = np.flatnonzero(same_object)
+    candidates = candidates.take(keep)
+    offset = np.stack([plane.take(candidates) for plane in offset])
+    distance = np.sqrt(_dot(offset, offset))
+    direction = offset / -np.maximum(distance, np.float32(1e-12))
+    normal = atlas.normal.take(index.take(candidates), 0)
     angle = np.flatnonzero(_dot(direction, normal.T) >= VISIBILITY.min_cosine)
-    at, keep, normal = at.take(angle), keep.take(angle), normal.take(angle, 0)
-    index = index.take(at)
-    to_camera = np.empty((len(at), 3), np.float32)
+    candidates, keep, normal = candidates.take(angle), keep.take(angle), normal.take(angle, 0)
+    index = index.take(candidates)
+    to_camera = np.empty((len(candidates), 3), np.float32)
     for i in range(3):
         to_camera[:, i] = direction[i].take(angle)
     if not free:
         origins = scene.off_surface(atlas.position.take(index, 0), normal)
         reach = distance.take(angle) - np.float32(2 * scene.offset)
-        open_ = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
-        index, to_camera, keep = index.take(open_), to_camera.take(open_, 0), keep.take(open_)
+        unoccluded = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
+        index, to_camera, keep = index.take(unoccluded), to_camera.take(unoccluded, 0), keep.take(unoccluded)
 
     x, y, pixel = x.take(keep), y.take(keep), pixel.take(keep)
     tier = _tiers(view, pixels).take(pixel)
-    mixed = np.flatnonzero(tier != CLEAN)
-    x[mixed], y[mixed] = np.floor(x[mixed]) + np.float32(0.5), np.floor(y[mixed]) + np.float32(0.5)
+    unclean = np.flatnonzero(tier != CLEAN)
+    x[unclean], y[unclean] = np.floor(x[unclean]) + np.float32(0.5), np.floor(y[unclean]) + np.float32(0.5)
     return Observations(index, _bilinear(pixels.radiance, x, y), tier, to_camera)
 
 
@@ -294,9 +302,9 @@ def normal_variance(view: FrameView, atlas: Atlas, element: np.ndarray, triangle
     x, y, _ = _projected(camera, (atlas.position[element] - camera.centre.astype(np.float32)).T)
     left = np.clip(np.rint(x).astype(np.int32) - 1, 0, camera.width - 2)
     top = np.clip(np.rint(y).astype(np.int32) - 1, 0, camera.height - 2)
-    around = top * camera.width + left + np.array([[0], [1], [camera.width], [camera.width + 1]], np.int32)
-    own = (view.object_id.ravel()[around] == atlas.object_id[element]).astype(np.float32)
-    share = own / np.maximum(own.sum(0), 1)
-    mean = np.einsum("jk,jki->ki", share, triangle_normal[view.triangle.ravel()[around]])
+    pixels = top * camera.width + left + np.array([[0], [1], [camera.width], [camera.width + 1]], np.int32)
+    same_object = (view.object_id.ravel()[pixels] == atlas.object_id[element]).astype(np.float32)
+    share = same_object / np.maximum(same_object.sum(0), 1)
+    mean = np.einsum("jk,jki->ki", share, triangle_normal[view.triangle.ravel()[pixels]])
     # The mean of unit vectors falls short of length 1 by their variance.
-    return np.where(own.any(0), np.maximum(1 - np.square(mean).sum(1), 0), 0).astype(np.float32)
+    return np.where(same_object.any(0), np.maximum(1 - np.square(mean).sum(1), 0), 0).astype(np.float32)

@@ -86,8 +86,8 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
             f"Frame '{frame.name}': '{frame.id_path}' has {ids.shape[1]} x {ids.shape[0]} pixels, but "
             f"its camera has {camera.width} x {camera.height}; give them one size."
         )
-    beside = ndimage.generate_binary_structure(2, 1)
-    same = ndimage.minimum_filter(ids, footprint=beside) == ndimage.maximum_filter(ids, footprint=beside)
+    cross = ndimage.generate_binary_structure(2, 1)
+    same = ndimage.minimum_filter(ids, footprint=cross) == ndimage.maximum_filter(ids, footprint=cross)
     chosen = np.zeros(ids.shape, bool)
     chosen[step // 2 :: step, step // 2 :: step] = True
     y, x = np.nonzero(same & chosen)
@@ -95,8 +95,8 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
     y, x, directions = y[ok], x[ok], directions[ok]
     hits = scene.intersect(camera.centre, directions)
     hit = hits.triangle >= 0
-    triangle, seen = hits.triangle[hit].astype(np.int64), ids[y[hit], x[hit]]
-    return _summed([(triangle, seen, np.ones(len(triangle), np.int64))])
+    triangle, seen_ids = hits.triangle[hit].astype(np.int64), ids[y[hit], x[hit]]
+    return _summed([(triangle, seen_ids, np.ones(len(triangle), np.int64))])
 
 
 def _summed(votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -121,14 +121,14 @@ def _spread(vertices: np.ndarray, triangles: np.ndarray, ids: np.ndarray, known:
     edge = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), 1)
     owner = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort((edge[:, 1], edge[:, 0]))
-    beside = (edge[order][1:] == edge[order][:-1]).all(1)
-    a, b = owner[order][:-1][beside], owner[order][1:][beside]
+    shared = (edge[order][1:] == edge[order][:-1]).all(1)
+    a, b = owner[order][:-1][shared], owner[order][1:][shared]
     length = np.linalg.norm(centre[a] - centre[b], axis=1) + 1e-9
     graph = sparse.coo_matrix((length, (a, b)), (len(triangles),) * 2).tocsr()
     sources = np.flatnonzero(known)
     _, _, source = dijkstra(graph, directed=False, indices=sources, return_predecessors=True, min_only=True)
     source = np.where(known, np.arange(len(triangles)), source)
-    far = np.flatnonzero(source < 0)
-    if len(far):
-        source[far] = sources[cKDTree(centre[sources]).query(centre[far])[1]]
+    unreached = np.flatnonzero(source < 0)
+    if len(unreached):
+        source[unreached] = sources[cKDTree(centre[sources]).query(centre[unreached])[1]]
     return ids[source]

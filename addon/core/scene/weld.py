@@ -1,4 +1,4 @@
-"""A mesh's vertices joined where they lie in one place, and what that tells of its neighbourhoods."""
+"""A mesh's vertices joined where they lie in one place, and what follows for its neighbourhoods."""
 
 import numpy as np
 from scipy import sparse

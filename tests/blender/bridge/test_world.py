@@ -6,7 +6,7 @@ import pytest
 from addon.core.errors import BadInputError
 from addon.core.io.exr import write_exr
 from addon.core.light.environment import Environment
-from addon.core.light.sun import Sun, put_in
+from addon.core.light.sun import Sun, insert_sun
 from addon.core.scene.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
@@ -73,7 +73,7 @@ def test_a_sun_lights_a_plane_and_throws_its_shadow(scene, shoot, look, tmp_path
     direction = np.array([0.48, -0.3, 0.7]) / np.linalg.norm([0.48, -0.3, 0.7])
     sun = Sun(np.float32(direction), np.float32([12, 9, 6]))
     sky = Environment(np.full((rows, 2 * rows, 3), 0.1, np.float32), np.ones((rows, 2 * rows), np.int32))
-    write_exr(tmp_path / "environment.exr", put_in(sky, sun)[::-1])
+    write_exr(tmp_path / "environment.exr", insert_sun(sky, sun)[::-1])
     set_world(scene, tmp_path / "environment.exr")
     material = bpy.data.materials.new("white")
     if material.node_tree is None:

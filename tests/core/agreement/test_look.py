@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.agreement.edges import shown
+from addon.core.agreement.edges import mesh_view
 from addon.core.agreement.look import look
 from addon.core.agreement.overlay import LINE, overlay
 from addon.core.agreement.params import AGREEMENT
@@ -96,7 +96,7 @@ def test_bends_of_a_fused_mesh_are_no_edges(room):
     camera = capture.frames[0].camera
 
     def edges(mesh, bends):
-        return shown(camera, mesh, RayScene(mesh.vertices, mesh.triangles), bends).edge
+        return mesh_view(camera, mesh, RayScene(mesh.vertices, mesh.triangles), bends).edge
 
     assert edges(rough, True).mean() > 1.3 * edges(capture.mesh, True).mean()
     steps = edges(capture.mesh, False)

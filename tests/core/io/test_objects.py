@@ -15,7 +15,7 @@ from addon.core.io.exr import write_exr
 from addon.core.io.id_pictures import read_ids
 from addon.core.io.png import write_png
 from addon.core.io.read import read_capture
-from addon.core.scene.closed_mesh import opened
+from addon.core.scene.closed_mesh import without_closing
 from addon.core.scene.connected_parts import connected_parts
 from addon.core.scene.model import Frame
 from addon.core.scene.rays import RayScene
@@ -177,6 +177,6 @@ def test_holes_of_a_room_in_one_piece_are_closed_unless_objects_are_told(capture
     (capture.root / "info_semantic.json").unlink()
     read = read_capture(capture.root)
     assert read.mesh.closed.tolist() == list(range(len(triangles), len(read.mesh.triangles)))
-    assert np.array_equal(opened(read).mesh.triangles, triangles)
+    assert np.array_equal(without_closing(read).mesh.triangles, triangles)
     names = {one.object_id: one.class_name for one in read.instances}
     assert "ceiling" in {names[int(one)] for one in read.mesh.object_id[read.mesh.closed]}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.scene.closed_mesh import as_scanned, opened, settled
+from addon.core.scene.closed_mesh import as_scanned, with_aligned_closing, without_closing
 from addon.core.scene.closing import close_holes
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
@@ -184,7 +184,7 @@ def test_the_scan_comes_back():
     )  # fmt: skip
     scan = as_scanned(mesh)
     assert np.array_equal(scan.vertices, vertices) and np.array_equal(scan.triangles, triangles)
-    both = opened(Capture(Path(), mesh, (Instance(0, "room"), Instance(7, "wall")), ()))
+    both = without_closing(Capture(Path(), mesh, (Instance(0, "room"), Instance(7, "wall")), ()))
     assert [one.object_id for one in both.instances] == [0] and both.mesh.closed is None
 
 
@@ -210,7 +210,7 @@ def closed_floor(crumbs=NONE, edge=0.1):
 def test_what_closes_a_floor_lies_just_under_the_scan_beside_it():
     """A step would throw a shadow where light comes in low. The floor is tilted, and the faces lie 2 cm under it."""
     mesh, scanned = closed_floor()
-    moved = settled(mesh)
+    moved = with_aligned_closing(mesh)
     scan = np.flatnonzero(mesh.vertices[:scanned, 0] < 1.65)  # beside them, not over them
     assert np.array_equal(moved.vertices[scan], mesh.vertices[scan])
     x, z = moved.vertices[scanned:, [0, 2]].T
@@ -229,7 +229,7 @@ def test_crumbs_of_a_floor_lie_flat_over_what_closes_it(edge, kept):
     crumbs = middle[:, None] + rng.uniform(-0.006, 0.006, (200, 3, 3))
     vase = np.array([[[2.3, 1.0, 0.3], [2.4, 1.0, 0.3], [2.3, 1.0, 0.5]]])
     mesh, scanned = closed_floor(np.concatenate([crumbs, vase]), edge)
-    moved = settled(mesh).vertices
+    moved = with_aligned_closing(mesh).vertices
     own, vase = np.arange(scanned - 603, scanned - 3), np.arange(scanned - 3, scanned)
     spread = [np.ptp(points[own, 2] - 0.01 * points[own, 0]) for points in (moved, mesh.vertices)]
     assert spread[0] == spread[1] if kept else spread[0] < 0.3 * spread[1]

@@ -15,7 +15,7 @@ from addon.core.scene.model import Mesh
 from addon.core.scene.orientation import seen_sides
 from addon.core.scene.rays import RayScene
 from addon.core.scene.surface import build_surface
-from addon.core.scene.two_sides import fronts, laid_apart, two_sided, with_backs, worth_it
+from addon.core.scene.two_sides import fronts, laid_apart, substantial, two_sided, with_backs
 from tests.core.rooms import DARK, box_sides, look_at, make_room, quad
 
 ROUND = 24
@@ -103,7 +103,7 @@ def test_little_of_an_object_and_of_the_room_is_left_as_it_is():
     for quads, told in (([leaf, *others, *room], False), ([leaf, *room], True), ([room[1], room[0]], True)):
         both = np.zeros(2 * len(quads), bool)
         both[:2] = True
-        np.testing.assert_array_equal(worth_it(make_room(quads).mesh, both), both & told)
+        np.testing.assert_array_equal(substantial(make_room(quads).mesh, both), both & told)
 
 
 def test_backs_lie_on_their_fronts_and_face_the_other_way():

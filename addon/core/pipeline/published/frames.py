@@ -27,12 +27,12 @@ def lit_diffuse(
     """L_d as `paper.lit_diffuse` has it, where all observations are of one kind; those clipped are counted beside."""
     clipped = np.zeros(len(atlas), np.int32)
 
-    def count(index: int, view: FrameView, pixels: Pixels, seen: Observations) -> None:
-        clipped[seen.element[seen.tier == SATURATED]] += 1
+    def count(index: int, view: FrameView, pixels: Pixels, observations: Observations) -> None:
+        clipped[observations.element[observations.tier == SATURATED]] += 1
         if also is not None:
-            also(index, view, pixels, seen)
+            also(index, view, pixels, observations)
 
-    found = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
-    share = (clipped / np.maximum(found.count, 1)).astype(np.float32)
-    tier = np.where(found.count == 0, -1, np.where(share == 1, SATURATED, CLEAN)).astype(np.int8)
-    return LitDiffuse(found.median, found.interquartile_range, found.count, tier, share)
+    medians = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
+    share = (clipped / np.maximum(medians.count, 1)).astype(np.float32)
+    tier = np.where(medians.count == 0, -1, np.where(share == 1, SATURATED, CLEAN)).astype(np.int8)
+    return LitDiffuse(medians.median, medians.interquartile_range, medians.count, tier, share)

@@ -24,7 +24,7 @@ def shade(
     mesh: Mesh,
     atlas: Atlas,
     scene: RayScene,
-    lit: LitDiffuse,
+    lit_diffuse: LitDiffuse,
     environment: Environment,
     *,
     rays: int,
@@ -33,26 +33,28 @@ def shade(
     progress: Progress | None = None,
 ) -> Shading:
     """S of every element by uniform rays, and the objects that must be lamps under it."""
-    light = CapturedLight(mesh, atlas, scene, lit.radiance, environment)
+    light = CapturedLight(mesh, atlas, scene, lit_diffuse.radiance, environment)
     E, escaped = irradiance(light, atlas.position, atlas.normal, rays, threads=threads, seed=seed, progress=progress)
-    lamps = find_seen(atlas.object_id[lit.seen], lit.radiance[lit.seen], E[lit.seen])
+    lamps = find_seen(atlas.object_id[lit_diffuse.seen], lit_diffuse.radiance[lit_diffuse.seen], E[lit_diffuse.seen])
     unknown = np.zeros(len(atlas), np.float32)
     return Shading(E, escaped, unknown, light.radiance, tuple(lamps), environment, (), (), len(atlas))
 
 
 def albedo_of(
     atlas: Atlas,
-    lit: LitDiffuse,
+    lit_diffuse: LitDiffuse,
     irradiance: np.ndarray,
     instances: tuple[Instance, ...],
     emitters: set[int],
     specular: np.ndarray | float = 0.0,
 ) -> Albedo:
-    """The quotient as it is, clamped at 1; what has none takes its object's albedo. Parameters as `albedo.albedo_of`.
+    """The quotient as it is, clamped at 1; elements without one take their object's albedo.
 
-    The error is that of the median.
+    Parameters as of `albedo.albedo_of`. The error is that of the median.
     """
-    rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
-    valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
-    found = fill(atlas, rho, valid, class_names(instances), emitters)
-    return replace(found, error=np.where(found.origin == MEASURED, relative_error(lit, atlas.object_id), found.error))
+    rho = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
+    valid = np.isfinite(rho).all(1) & (lit_diffuse.tier != SATURATED)
+    albedo = fill(atlas, rho, valid, class_names(instances), emitters)
+    return replace(
+        albedo, error=np.where(albedo.origin == MEASURED, relative_error(lit_diffuse, atlas.object_id), albedo.error)
+    )

@@ -19,26 +19,34 @@ from ..choose_models import Room
 
 def fit_targets(instances: Sequence[Instance], room: Room) -> dict[int, ObjectMaterial]:
     """A lobe for each of these objects, from its target frame; diffuse where no frame can be one."""
-    field, known, samples, how = room.field, room.lit_diffuse.radiance, room.samples, room.settings
+    field, radiance, samples, settings = room.field, room.lit_diffuse.radiance, room.samples, room.settings
     names = room.frame_names
 
     def look(instance: Instance) -> ObjectMaterial:
         index = usable(samples, field.atlas.object_id, instance.object_id)
-        found = fit_object(
-            field, field.atlas, known, samples, index, len(names), how.specular_rays, threads=how.threads, seed=how.seed
+        target_fit = fit_object(
+            field,
+            field.atlas,
+            radiance,
+            samples,
+            index,
+            len(names),
+            settings.specular_rays,
+            threads=settings.threads,
+            seed=settings.seed,
         )
-        if found is None:
+        if target_fit is None:
             note = "No frame shows enough of it."
             return ObjectMaterial(instance.object_id, instance.class_name, LAMBERTIAN, note=note)
-        diffuse = known[samples.element[found.index]]
+        diffuse = radiance[samples.element[target_fit.index]]
         level = np.maximum(diffuse.mean(1), 1e-12)
-        residuals = found.lobe.residual, samples.radiance[found.index] - diffuse
-        left, whole = (float(np.median(np.sqrt(np.square(x).mean(1)) / level)) for x in residuals)
-        psi = np.full(3, found.lobe.psi)
-        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, left, whole))
-        name = names[found.frame]
+        residuals = target_fit.lobe.residual, samples.radiance[target_fit.index] - diffuse
+        residual, unexplained = (float(np.median(np.sqrt(np.square(x).mean(1)) / level)) for x in residuals)
+        psi = np.full(3, target_fit.lobe.psi)
+        choice = Choice(DIELECTRIC, LobeFit(target_fit.lobe.phi, psi, 0.0, 0.0, residual, unexplained))
+        name = names[target_fit.frame]
         material = described(instance, choice, None, name, gloss_interval(choice, None))
-        return replace(material, observations=len(found.index))
+        return replace(material, observations=len(target_fit.index))
 
     materials = {}
     for instance in instances:

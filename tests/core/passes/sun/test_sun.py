@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.light.environment import Environment
-from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
+from addon.core.light.sun import RADIUS, Sun, extract_sun, insert_sun, sunlight
 from addon.core.luminance import LUMINANCE
 from addon.core.passes.sun.sun_patch import find_patch_sun
 from addon.core.pipeline.shading import shade
@@ -124,7 +124,7 @@ def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
 def with_disc(direction, irradiance, rows=256, sky=1.0):
     blank = Environment(np.full((rows, 2 * rows, 3), sky, np.float32), np.ones((rows, 2 * rows), np.int32))
     sun = Sun(np.float32(direction), np.float32(irradiance))
-    radiance = put_in(blank, sun)
+    radiance = insert_sun(blank, sun)
     return Environment(radiance, np.ones(radiance.shape[:2], np.int32)), sun
 
 
@@ -144,7 +144,7 @@ def irradiance_of(radiance, direction):
 def test_a_sun_in_the_map_gives_its_irradiance_from_its_place(rows, direction):
     direction = np.array(direction) / np.linalg.norm(direction)
     dark = Environment(np.zeros((rows, 2 * rows, 3), np.float32), np.zeros((rows, 2 * rows), np.int32))
-    radiance = put_in(dark, Sun(np.float32(direction), np.float32([30, 20, 10]), RADIUS))
+    radiance = insert_sun(dark, Sun(np.float32(direction), np.float32([30, 20, 10]), RADIUS))
     assert len(radiance) >= 512
     E, way, solid = irradiance_of(radiance, direction)
     assert np.allclose(E, [30, 20, 10], rtol=1e-3)
@@ -155,34 +155,36 @@ def test_a_sun_in_the_map_gives_its_irradiance_from_its_place(rows, direction):
 def test_a_seen_sun_comes_out_of_the_map_and_goes_back_in():
     direction = np.array([0.5, 0.3, 0.6]) / np.linalg.norm([0.5, 0.3, 0.6])
     shown, sun = with_disc(direction, (40, 30, 20))
-    left, found = taken_out(shown)
+    left, found = extract_sun(shown)
     assert found.seen and angle(found.direction, direction) < 0.1
     assert np.allclose(found.irradiance, sun.irradiance, rtol=0.02)
     assert np.allclose(left.radiance, 1.0, atol=1e-4)
-    whole, _, _ = irradiance_of(put_in(left, found), direction)
+    whole, _, _ = irradiance_of(insert_sun(left, found), direction)
     assert np.allclose(whole, irradiance_of(shown.radiance, direction)[0], rtol=0.01)
 
 
 def test_what_is_no_sun_stays_in_the_map():
     plain = Environment(np.random.default_rng(0).uniform(0.5, 5, (64, 128, 3)).astype(np.float32),
                         np.ones((64, 128), np.int32))  # fmt: skip
-    assert taken_out(plain) == (plain, None)
+    assert extract_sun(plain) == (plain, None)
     two, _ = with_disc((0.6, 0, 0.8), (40, 30, 20))
     other, _ = with_disc((0, 0.8, 0.6), (40, 30, 20))
     both = Environment(two.radiance + other.radiance, two.observations)
-    assert taken_out(both)[1] is None
+    assert extract_sun(both)[1] is None
     clipped = two.radiance[..., 0] > 10
-    assert taken_out(Environment(two.radiance, two.observations, clipped))[1] is None
+    assert extract_sun(Environment(two.radiance, two.observations, clipped))[1] is None
     faint, _ = with_disc((0.6, 0, 0.8), (0.01, 0.01, 0.01))
-    assert taken_out(faint)[1] is None
-    assert taken_out(Environment.dark())[1] is None
+    assert extract_sun(faint)[1] is None
+    assert extract_sun(Environment.dark())[1] is None
 
 
 @pytest.mark.slow
 def test_a_seen_sun_lights_the_room_without_noise(room):
     """E in the patch is that of sun and sky, though the sun is half a texel of the map."""
     blank = sky_map(np.ones((64, 128), np.int32))
-    shown = Environment(put_in(blank, Sun(np.float32(sunny.TOWARDS), np.float32(sunny.SUN))), np.ones((512, 1024), int))
+    shown = Environment(
+        insert_sun(blank, Sun(np.float32(sunny.TOWARDS), np.float32(sunny.SUN))), np.ones((512, 1024), int)
+    )
     light = sunny.light(room)
     found = run(room, light, shown, texture=0.0)
     assert found.sun.seen and np.allclose(found.sun.irradiance, sunny.SUN, rtol=0.03)
