@@ -91,13 +91,13 @@ class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
         return [f"{count} material{'s' * (count > 1)} {done}."]
 
 
-def _wearing(context) -> bool:
-    from ...addon.bridge.own_scene.write_back import wearing
+def _has_restorable(context) -> bool:
+    from ...addon.bridge.own_scene.write_back import restorable
 
-    return bool(wearing(context.scene.objects))
+    return bool(restorable(context.scene.objects))
 
 
-@needs(_wearing, "No object of this scene wears a recovered material over its own.")
+@needs(_has_restorable, "No object of this scene wears a recovered material over its own.")
 @object_mode
 @has_scene
 class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
