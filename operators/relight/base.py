@@ -62,7 +62,7 @@ def _rested() -> None:
 def look_soon(scene: bpy.types.Scene) -> None:
     """Have a panel know before long how bright the light is; it can be asked for by what draws."""
     if _looked["run"] is None and not bpy.app.background and not estimate.is_known(scene):
-        _looked["run"] = estimate.looking(scene)
+        _looked["run"] = estimate.measure_in_steps(scene)
         bpy.app.timers.register(_look, first_interval=_SLICE)
 
 
