@@ -59,11 +59,11 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and bool(_found or any(find.known()))
+        return context.scene is not None and bool(_found or any(find.cached_state()))
 
     def draw(self, context):
         layout = self.layout
-        missing, overtaken = find.known()
+        missing, overtaken = find.cached_state()
         for one in missing:
             self.say(layout, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
@@ -103,7 +103,7 @@ def folders(scene: bpy.types.Scene | None) -> list[Path]:
     """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
     from ...addon.core.results.cache import results as below
 
-    beside = home.beside()
+    beside = home.folder_beside_file()
     own = told.folder_of(scene) if scene is not None else None
     return [*below(preferences.results_folder()), *(below(beside) if beside else ()), *([own] if own else ())]
 

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ...addon.bridge.results import file, look
-from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
+from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNKNOWN, Result, result_state, result_states
 from ...addon.core.brdf.registry import find, shown
 from ...addon.core.kinds import Shown
 from .. import preferences
@@ -21,7 +21,7 @@ GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "
 
 def folder_of(scene: bpy.types.Scene) -> Path | None:
     """The result folder that a scene's panel is about: the active object's, else the chosen one, else the room's."""
-    state, result = standing(active(scene))
+    state, result = result_state(active(scene))
     if state == FITS:
         return result.folder
     choices = scene.scan_relight
@@ -54,7 +54,7 @@ def refused(things) -> list[tuple[str, Path | None]]:
     list of (str, Path or None)
         A sentence, and the folder whose run has to be brought in; None where nobody can tell.
     """
-    states = [(state, result) for state, result in standings(things).values() if state in (EARLIER, UNTOLD)]
+    states = [(state, result) for state, result in result_states(things).values() if state in (EARLIER, UNKNOWN)]
     counts = Counter(result.folder if state == EARLIER else None for state, result in states)
     return [
         (

@@ -83,7 +83,7 @@ def writing_back(
     check_own(capture.root)
     if polygons is None:
         raise MissingStageError(f"Capture '{capture.root}' is damaged; capture the scene again.")
-    base_color = images.bring(result_folder, where)
+    base_color = images.load_baked(result_folder, where)
     corner_uv, torn = corner_uvs(polygons, atlas_uv)
     descriptions = {material.object_id: material for material in materials}
     assignment = _Assignment(scene, Path(result_folder).absolute(), base_color)

@@ -93,7 +93,7 @@ def bringing(
                 yield 0.4 + 0.2 * done / len(things)
         if shell.world is not None:
             stamp_tree(shell.world)
-        now = room_changes.found(folder)
+        now = room_changes.read_findings(folder)
         steps = None
         if top is not None:
             steps = yield from plan(top, fresh)
@@ -112,12 +112,12 @@ def bringing(
         top, differences = fresh, ()
         note_known(top, things)
     else:
-        differences = room_changes.compare(room_changes.kept(top), now)
+        differences = room_changes.compare(room_changes.stored_findings(top), now)
         warnings = commit(steps, top, fresh, shell)
         shell.collection.children.unlink(fresh)
-    room_changes.keep(top, now)
+    room_changes.store_findings(top, now)
     place, kept = _place(top, shell, scene, root, steps is None)
-    room_changes.show(place, differences)
+    room_changes.store_changes(place, differences)
     made.remove_unused(steps.replaced if steps is not None else ())
     for one, label in steps.names if steps is not None else ():
         one.name = label
