@@ -25,11 +25,11 @@ GROUPS = (
 )
 OTHER = "More"
 CHANGES: Shown[int] = 8
-"""Objects that are listed as different since the run before."""
+"""Maximum number of objects that are listed as changed since the previous run."""
 
 
 def groups() -> list[tuple[str, list[str]]]:
-    """Every setting under its heading; one that has none comes last."""
+    """Every setting under its heading; those without one come last."""
     names = [info.name for info in setting_infos()]
     placed = {name for _, group in GROUPS for name in group}
     grouped = [(heading, [name for name in group if name in names]) for heading, group in GROUPS]
@@ -76,7 +76,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
                     fields(column, choices.settings, *names)
 
     def start(self, context) -> None:
-        """The button; where a run was stopped, it goes on, and there is another to start anew."""
+        """The button; where a run was stopped, it resumes, and there is another one to start again."""
         choices = context.scene.scan_relight
         folder = preferences.chosen_result(context.scene)
         stage = goes_on_with(folder) if folder is not None else ""
@@ -101,7 +101,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         column.operator("scan_relight.stop", text="Stop", icon="CANCEL")
 
     def room(self, context) -> None:
-        """What differs since the run before, and the way into the artist's own scene."""
+        """Changes since the previous run, and the button to link the room into another scene."""
         scene, layout = context.scene, self.layout
         if not scene.get(OWN_SCENE):
             return
