@@ -43,9 +43,9 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.label(text="This is:")
         given = corrections.given(obj)
-        for pair in (STATEMENTS[at : at + 2] for at in range(0, len(STATEMENTS), 2)):
+        for statements in (STATEMENTS[start : start + 2] for start in range(0, len(STATEMENTS), 2)):
             row = column.row(align=True)
-            for model, label, _ in pair:
+            for model, label, _ in statements:
                 row.operator(
                     "scan_relight.this_is", text=label, icon=named(model).icon, depress=given.get("model") == model
                 ).model = model
@@ -158,6 +158,10 @@ class SCAN_RELIGHT_PT_correct_smooth(CorrectPart, bpy.types.Panel):
         layout, angle = self.layout, context.scene.scan_relight_correct.smooth_angle
         layout.prop(context.scene.scan_relight_correct, "smooth_angle")
         row = layout.row(align=True)
-        for text, everything, wanted in (("Selected", False, angle), ("Whole Room", True, angle), ("Flat", False, 0.0)):
+        for text, everything, target_angle in (
+            ("Selected", False, angle),
+            ("Whole Room", True, angle),
+            ("Flat", False, 0.0),
+        ):
             button = row.operator("scan_relight.smooth_by_angle", text=text)
-            button.everything, button.angle = everything, wanted
+            button.everything, button.angle = everything, target_angle

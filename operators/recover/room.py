@@ -32,7 +32,7 @@ def copy_properties(choices, source) -> None:
 _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the items
 
 
-def others(operator, context) -> list[tuple[str, str, str]]:
+def scene_items(operator, context) -> list[tuple[str, str, str]]:
     """The other scenes, as items of an enum."""
     _items[:] = [
         (scene.name, scene.name, "Show the room in this scene as well")
@@ -52,7 +52,7 @@ class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
     bl_label = "Link into Scene"
     remarks = "INFO"
 
-    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=others)
+    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=scene_items)
     outside: bpy.props.BoolProperty(
         name="With Its Outside", description="Give that scene the room's world and exposure, too"
     )

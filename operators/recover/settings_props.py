@@ -118,11 +118,11 @@ def startable(operator):
     return free_scene(packages(operator))
 
 
-def preset_property(description: str, **more):
+def preset_property(description: str, **kwargs):
     """A property for the name of a preset."""
     items = [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
     keywords = {"name": "Preset", "description": description, "default": "normal", "translation_context": OWN}
-    return bpy.props.EnumProperty(items=items, **keywords, **more)
+    return bpy.props.EnumProperty(items=items, **keywords, **kwargs)
 
 
 @startable
@@ -181,25 +181,25 @@ class StageOperator(SettingsProps, CaptureOperator):
 
     def settings(self) -> Settings:
         """The preset with every setting that is set; threads from the preferences where they are not."""
-        given = {
+        values = {
             info.name: setting_value(self, info)
             for info in setting_infos()
             if self.properties.is_property_set(info.name)
         }
-        ours = preferences.preferences()
-        if not given.get("threads") and ours is not None:
-            given["threads"] = ours.threads
-        return replace(PRESETS[self.preset], **given)
+        addon_preferences = preferences.preferences()
+        if not values.get("threads") and addon_preferences is not None:
+            values["threads"] = addon_preferences.threads
+        return replace(PRESETS[self.preset], **values)
 
-    def run(self, context, until: str, **how) -> dict:
-        """Run the stages up to `until` here; returns the report. `how` goes to `bridge.job.run.run`."""
+    def run(self, context, until: str, **options) -> dict:
+        """Run the stages up to `until` here; returns the report. `options` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
         from ...addon.core.pipeline.run import Asked, progress_of_run  # not earlier: Blender's start should not wait
 
-        settings, asked = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
+        settings, request = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
         folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
-            return run(*folders, settings, progress_of_run(should_stop=guard), asked, **how)
+            return run(*folders, settings, progress_of_run(should_stop=guard), request, **options)
 
     def first_stage(self) -> str | None:
         """The stage that is computed again with all later ones; None continues from the stored ones."""
@@ -208,8 +208,8 @@ class StageOperator(SettingsProps, CaptureOperator):
     @staticmethod
     def memory_limit() -> float | None:
         """Gigabytes that a run may use; None for most of the free memory."""
-        ours = preferences.preferences()
-        return (ours.memory_limit or None) if ours is not None else None
+        addon_preferences = preferences.preferences()
+        return (addon_preferences.memory_limit or None) if addon_preferences is not None else None
 
     def begin(self, context):
         """Start the run as a job of the command line, so that its result is the same."""

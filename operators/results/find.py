@@ -9,7 +9,7 @@ from ...addon.core.errors import BadInputError
 from .. import preferences
 from ..base.operator import FOLDERS, AtOnce, Choosing, folder_property, needs, no_run
 from ..base.panel import SidebarPanel
-from . import told
+from . import summary
 
 _messages: list[str] = []
 """Messages on results that were found when the open file was loaded."""
@@ -104,7 +104,7 @@ def folders(scene: bpy.types.Scene | None) -> list[Path]:
     from ...addon.core.results.cache import results as results_below
 
     folder_beside = home.folder_beside_file()
-    own_folder = told.folder_of(scene) if scene is not None else None
+    own_folder = summary.folder_of(scene) if scene is not None else None
     return [
         *results_below(preferences.results_folder()),
         *(results_below(folder_beside) if folder_beside else ()),
@@ -144,8 +144,8 @@ class SCAN_RELIGHT_OT_clear_cache(AtOnce, bpy.types.Operator):
 
 
 def _page(context) -> Path | None:
-    folder = told.folder_of(context.scene) if context.scene else None
-    return folder / told.PAGE if folder is not None and (folder / told.PAGE).is_file() else None
+    folder = summary.folder_of(context.scene) if context.scene else None
+    return folder / summary.PAGE if folder is not None and (folder / summary.PAGE).is_file() else None
 
 
 @needs(_page, "There is no report yet; run the recovery to its end first.")

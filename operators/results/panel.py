@@ -14,7 +14,7 @@ from ...addon.core.naming import in_order
 from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
 from ..base.panel import NamedRows, SidebarPanel, places
-from . import told as results
+from . import summary as results
 from .look import select
 
 NAME: Shown[float] = 0.62

@@ -263,9 +263,9 @@ def _keeps_images(folder: Path, lost: Missing) -> bool:
 def _may_be_result(place: Path, folder: Path) -> bool:
     """Whether a result of unknown run may be that of `folder`: it has all of its objects."""
     result = file.read(place)
-    wanted = set()
+    object_ids = set()
     for obj in bpy.data.objects:
         with suppress(TypeError):
             if Path(obj.get(RESULT, "")) == folder:
-                wanted.add(obj.get(OBJECT_ID))
-    return result is not None and not result.run and wanted <= set(result.objects)
+                object_ids.add(obj.get(OBJECT_ID))
+    return result is not None and not result.run and object_ids <= set(result.objects)

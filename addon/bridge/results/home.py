@@ -46,9 +46,9 @@ def capture_folder(home: Path, chosen: str) -> Path:
     """The folder that a capture of the open scene goes to; the previous one is `chosen` in the panel."""
     if bpy.data.filepath:
         return (folder_beside_file() or home) / CAPTURES / Path(bpy.data.filepath).stem
-    before = Path(bpy.path.abspath(chosen)) if chosen else None
-    if before is not None and before.parent == home / CAPTURES and before.name.startswith(UNSAVED):
-        return before
+    previous = Path(bpy.path.abspath(chosen)) if chosen else None
+    if previous is not None and previous.parent == home / CAPTURES and previous.name.startswith(UNSAVED):
+        return previous
     return free_folder(home / CAPTURES, UNSAVED)
 
 
