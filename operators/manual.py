@@ -1,4 +1,4 @@
-"""The documentation that comes with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
+"""The documentation bundled with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
 
 from pathlib import Path
 

@@ -8,7 +8,7 @@ from .base.job_operator import active, bar
 NEED_MORE = ("restore_lamp", "select_result_object")
 """Operators that need an item of a list; all others are in the menu, where F3 finds them."""
 WIDTH: Shown[int] = 14
-"""Of the bar, in units of the interface."""
+"""Width of the bar, in units of the interface."""
 
 
 class SCAN_RELIGHT_MT_all(bpy.types.Menu):

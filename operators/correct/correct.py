@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` by which an artist says what an object is, or paints what no frame saw."""
+"""`bpy.ops.scan_relight.*` for statements on what an object is, and for painting what no frame saw."""
 
 from pathlib import Path
 

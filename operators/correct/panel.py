@@ -107,7 +107,7 @@ class CorrectPart(SidebarPanel):
 
 
 class SCAN_RELIGHT_PT_correct_scale(CorrectPart, bpy.types.Panel):
-    """A known white."""
+    """An object or spot of known albedo."""
 
     bl_label = "Known White"
 

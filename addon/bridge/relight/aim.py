@@ -60,7 +60,7 @@ def spot_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
 
 
 def window_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
-    """In an opening of the room, else before a wall, to the side; what lights most of the picture."""
+    """In an opening of the room, else in front of a wall, to the side; the one that lights most of the picture."""
     low, high = bounds(scene)
     room_height, start = high.z - low.z, _in_front_of(scene, subject.target)
     center = Vector((start.x, start.y, low.z + min(1.5, 0.58 * room_height)))

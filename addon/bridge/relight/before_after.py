@@ -76,7 +76,7 @@ def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool
 
 
 def save_copy(folder: Path) -> None:
-    """Save what is open as a copy that the command `relight` can open; what is open stays as it is."""
+    """Save a copy of the open file for the command `relight`; the open file stays as it is."""
     with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), copy=True, compress=False, relative_remap=True)
 

@@ -193,7 +193,7 @@ def is_relit(scene: bpy.types.Scene) -> bool:
 
 
 def restore_captured(scene: bpy.types.Scene) -> None:
-    """Back to the captured light for good: lamps and outside restored, added lights removed."""
+    """Restore the captured light permanently: lamps and outside restored, added lights removed."""
     for lamp in relight_lamps.find_lamps(scene):
         relight_lamps.restore(lamp)
     relight_outside.restore(scene)

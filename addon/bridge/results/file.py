@@ -78,7 +78,7 @@ def _value_of_type(document: dict[str, Any], key: str, kind: type):
 
 
 def forget() -> None:
-    """Read everything again."""
+    """Clear the cache."""
     _cache.clear()
 
 

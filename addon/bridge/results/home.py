@@ -14,7 +14,7 @@ from ..marks import CAPTURE, RESULT
 PACKAGE = __package__.rsplit(".", 3)[0]
 """The root package, under whatever name Blender installed it."""
 CAPTURES, UNSAVED = "captures", "unsaved scene"
-"""Folder among the results that captures of scenes go to; the name of one whose .blend was never saved."""
+"""Folder of captures of scenes among the results; the name of a capture whose .blend was never saved."""
 
 
 def results_folder(preferred: str = "") -> Path:

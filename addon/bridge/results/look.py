@@ -83,7 +83,7 @@ LOOKS = {
 
 
 def current(scene: bpy.types.Scene) -> str:
-    """The look that a scene shows."""
+    """The current look of a scene."""
     for obj in scene.objects:
         modifier = obj.modifiers.get(NAME)
         if modifier is not None and modifier.type == "NODES" and modifier.node_group is not None:
@@ -226,7 +226,7 @@ def _math(tree, operation: str, *values):
 
 
 def _certainty(tree, folder: Path):
-    """0...1 for relative errors of the albedo from `DOUBTFUL` down to 1/16 of it, by their logarithm."""
+    """0...1 for relative errors of the albedo from `MAX_RELATIVE_ERROR` down to 1/16 of it, by their logarithm."""
     error, albedo = (
         _math(tree, "ADD", _math(tree, "ADD", red, green), blue)
         for red, green, blue in (_channels(tree, folder, name) for name in ("albedo_error.exr", "albedo.exr"))
