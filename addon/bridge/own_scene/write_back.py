@@ -189,7 +189,7 @@ class _Assignment:
             obj.hide_viewport = obj.hide_render = True
         return changed
 
-    def _frozen(self, part: Part, source: Source, depsgraph) -> bpy.types.Object:
+    def _evaluated_copy(self, part: Part, source: Source, depsgraph) -> bpy.types.Object:
         """A new object with a part's evaluated faces as its mesh, in the collections of the artist's object."""
         obj, data = part.obj, None
         matrix = obj.evaluated_get(depsgraph).matrix_world.copy()
