@@ -2,7 +2,7 @@
 
 
 def classes() -> tuple[type, ...]:
-    """Everything that Blender has to know, in the order in which menus and panels show it."""
+    """All classes to register, in the order of menus and panels."""
     from . import manual, menus
     from .base import job_operator
     from .correct import correct
@@ -14,15 +14,15 @@ def classes() -> tuple[type, ...]:
     from .results import find, look
     from .results import panel as results_panel
 
-    def own(*modules, kinds: tuple[str, ...]) -> list[type]:
-        """The classes of some kinds of modules, in the order of their writing."""
+    def classes_of(*modules, kinds: tuple[str, ...]) -> list[type]:
+        """The classes of some kinds in modules, in the order of definition."""
         starts = tuple(f"SCAN_RELIGHT_{kind}" for kind in kinds)
-        found = [(module, one) for module in modules for name, one in vars(module).items() if name.startswith(starts)]
-        return [one for module, one in found if one.__module__ == module.__name__]
+        members = [(module, cls) for module in modules for name, cls in vars(module).items() if name.startswith(starts)]
+        return [cls for module, cls in members if cls.__module__ == module.__name__]
 
     modules = stages, job_operator, room, find, files, look, lights, view, export, correct, manual, menus
-    operators = own(*modules, kinds=("OT", "MT", "FH"))
-    panels = own(
+    operators = classes_of(*modules, kinds=("OT", "MT", "FH"))
+    panels = classes_of(
         *(find, panel_capture, panel_recover, results_panel, correct_panel, look, relight_panel, export),
         kinds=("PT", "UL"),
     )
@@ -31,7 +31,7 @@ def classes() -> tuple[type, ...]:
 
 
 def pointers() -> tuple[tuple[type, str, type], ...]:
-    """Blender type, name and property group of everything that hangs on Blender's own data."""
+    """Type of Blender's, name and property group of each pointer property."""
     from bpy.types import Light, Material, Object, Scene, World
 
     from .correct.props import ScanRelightCorrecting, ScanRelightCorrection
@@ -61,13 +61,13 @@ def handlers() -> tuple[tuple[list, object], ...]:
         (load_pre, forget_job),
         (load_post, find.look_for_results),
         (save_pre, find.keep_images),
-        (save_post, find.found_is_kept),
+        (save_post, find.clear_messages),
         (save_pre, keep_painted),
     )
 
 
 def register():
-    """Register every class, an operator by its name with its docstring as the tooltip; hang the property groups up."""
+    """Register every class, an operator by its name with its docstring as the tooltip; add the pointer properties."""
     import bpy
 
     from . import keymaps, manual, menus, translations
@@ -81,8 +81,8 @@ def register():
     for owner, name, group in pointers():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
-    for known, ours in handlers():
-        known.append(ours)
+    for handler_list, handler in handlers():
+        handler_list.append(handler)
     translations.register()
     menus.register()
     keymaps.register()
@@ -90,7 +90,7 @@ def register():
 
 
 def unregister():
-    """Take back what `register` did."""
+    """Undo `register`."""
     import bpy
 
     from ..addon.bridge.corrections import corrections
@@ -104,10 +104,10 @@ def unregister():
     keymaps.unregister()
     menus.unregister()
     translations.unregister()
-    for known, ours in handlers():
-        known.remove(ours)
-    for one in (corrections, findings, file, job):
-        one.forget()
+    for handler_list, handler in handlers():
+        handler_list.remove(handler)
+    for module in (corrections, findings, file, job):
+        module.forget()
     lights.forget_pictures()
     job.end_all()
     del bpy.types.Scene.scan_relight_row

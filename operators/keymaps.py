@@ -1,4 +1,4 @@
-"""Keys of the artist's choice: entries of the 3D view without a key, to be given one in the preferences."""
+"""Keymap items of the 3D view without a key, to be assigned one in the preferences."""
 
 import bpy
 
@@ -17,11 +17,11 @@ _added: list[tuple] = []
 
 
 def register() -> None:
-    """Add the entries, without keys; there is no keyboard in the background."""
-    known = bpy.context.window_manager.keyconfigs.addon
-    if known is None:
+    """Add the items, without keys; in the background there is no key configuration."""
+    keyconfig = bpy.context.window_manager.keyconfigs.addon
+    if keyconfig is None:
         return
-    keymap = known.keymaps.new(name=MAP, space_type="VIEW_3D")
+    keymap = keyconfig.keymaps.new(name=MAP, space_type="VIEW_3D")
     for operator, properties in ENTRIES:
         item = keymap.keymap_items.new(operator, type="NONE", value="PRESS")
         for name, value in properties.items():
@@ -30,16 +30,16 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them back."""
+    """Remove them."""
     for keymap, item in _added:
         keymap.keymap_items.remove(item)
     _added.clear()
 
 
 def draw(layout, context) -> None:
-    """The entries as the artist has set them, in the preferences."""
-    known = context.window_manager.keyconfigs.user
-    keymap = known.keymaps.get(MAP) if known is not None else None
+    """Draw the items as the artist has set them, in the preferences."""
+    keyconfig = context.window_manager.keyconfigs.user
+    keymap = keyconfig.keymaps.get(MAP) if keyconfig is not None else None
     if keymap is None:
         return
     import rna_keymap_ui
@@ -49,13 +49,13 @@ def draw(layout, context) -> None:
     if body is None:
         return
     body.use_property_split = body.use_property_decorate = False
-    left = list(zip(ENTRIES, LABELS, strict=True))
+    unmatched = list(zip(ENTRIES, LABELS, strict=True))
     for item in keymap.keymap_items:
-        for entry in left:
+        for entry in unmatched:
             (operator, properties), label = entry
-            given = {name: getattr(item.properties, name, None) for name in properties}
-            if (operator, properties) == (item.idname, given):
-                left.remove(entry)
+            item_properties = {name: getattr(item.properties, name, None) for name in properties}
+            if (operator, properties) == (item.idname, item_properties):
+                unmatched.remove(entry)
                 body.label(text=label)
-                rna_keymap_ui.draw_kmi([], known, keymap, item, body, 0)
+                rna_keymap_ui.draw_kmi([], keyconfig, keymap, item, body, 0)
                 break

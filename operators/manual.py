@@ -1,11 +1,11 @@
-"""The documentation that comes with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
+"""The documentation bundled with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
 
 from pathlib import Path
 
 import bpy
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
-"""Installed: pages for a browser. In a checkout: the Markdown that they are made of."""
+"""Installed: HTML pages. In a checkout: the Markdown that they are made of."""
 MAP = (
     ("bpy.ops.scan_relight.refit*", "corrections"),
     ("bpy.ops.scan_relight.this_is*", "corrections"),
@@ -35,18 +35,18 @@ MAP = (
     ("bpy.types.scanrelightpreferences.*", "panel#preferences"),
     ("bpy.types.scanrelight*", "panel#recover"),
 )
-"""Blender's names of operators and properties, lower case, and the page of each; the first that fits counts."""
+"""Blender's names of operators and properties, lower case, and the page of each; the first match counts."""
 
 
 def file_name(page: str) -> str:
-    """The file of a page such as 'panel#recover', with the part that is meant."""
-    name, mark, part = page.partition("#")
-    ending = "html" if (DOCS / f"{name}.html").is_file() else "md"
-    return f"{name}.{ending}{mark}{part}"
+    """The file of a page such as 'panel#recover', with its anchor."""
+    name, separator, anchor = page.partition("#")
+    extension = "html" if (DOCS / f"{name}.html").is_file() else "md"
+    return f"{name}.{extension}{separator}{anchor}"
 
 
 def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """What `bpy.utils.register_manual_map` asks for."""
+    """Callback of `bpy.utils.register_manual_map`."""
     return f"{DOCS.as_uri()}/", tuple((pattern, file_name(page)) for pattern, page in MAP)
 
 
@@ -60,7 +60,7 @@ class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
     )
 
     def execute(self, context):
-        """Open it; in the background only say where it lies."""
+        """Open it; in the background only report its address."""
         name = file_name(self.page)
         if not (DOCS / name.partition("#")[0]).is_file():
             self.report({"ERROR"}, f"The documentation has no page '{self.page}'; install the extension again.")

@@ -1,4 +1,4 @@
-"""Where Blender's own menus and bars tell of us: File > Import, and the progress of a run in the status bar."""
+"""Our entries in Blender's own menus and bars: File > Import, and the progress of a run in the status bar."""
 
 import bpy
 
@@ -6,9 +6,9 @@ from ..addon.core.kinds import Shown
 from .base.job_operator import active, bar
 
 NEED_MORE = ("restore_lamp", "select_result_object")
-"""Operators that say nothing without what a list has chosen; all others are in the menu, where F3 finds them."""
+"""Operators that need an item of a list; all others are in the menu, where F3 finds them."""
 WIDTH: Shown[int] = 14
-"""Of the bar, in units of the interface."""
+"""Width of the bar, in units of the interface."""
 
 
 class SCAN_RELIGHT_MT_all(bpy.types.Menu):
@@ -17,7 +17,7 @@ class SCAN_RELIGHT_MT_all(bpy.types.Menu):
     bl_label = "Scan Relight"
 
     def draw(self, context):
-        """One line each, in the order of registration; they ask for what they need."""
+        """One line each, in the order of registration; they ask for their properties."""
         layout = self.layout
         layout.operator_context = "INVOKE_DEFAULT"
         for name in names():
@@ -29,8 +29,8 @@ def names() -> list[str]:
     from . import classes
 
     operators = [cls for cls in classes() if issubclass(cls, bpy.types.Operator)]
-    found = [cls.bl_idname.partition(".")[2] for cls in operators if "INTERNAL" not in getattr(cls, "bl_options", ())]
-    return [name for name in found if name not in NEED_MORE]
+    idnames = [cls.bl_idname.partition(".")[2] for cls in operators if "INTERNAL" not in getattr(cls, "bl_options", ())]
+    return [name for name in idnames if name not in NEED_MORE]
 
 
 def object_entry(menu, context) -> None:
@@ -45,7 +45,7 @@ def import_entry(menu, context) -> None:
 
 
 def run_entry(header, context) -> None:
-    """Each window's status bar, in any workspace; nothing where no run goes on, so nothing has to be cleared."""
+    """Each window's status bar, in any workspace; nothing while no run is going on, so nothing has to be cleared."""
     job = active()
     if job is None:
         return
@@ -64,13 +64,13 @@ def register() -> None:
     bpy.types.TOPBAR_MT_file_import.append(import_entry)
     bpy.types.VIEW3D_MT_object.append(object_entry)
     bpy.types.STATUSBAR_HT_header.append(run_entry)
-    # `WorkSpace.status_text_set` puts back the bar's drawing as it first found it: have it look again, or ours is lost.
+    # `WorkSpace.status_text_set` restores the draw function that it first stored: clear that, or our entry is lost.
     if "_draw_orig" in vars(STATUSBAR_HT_header):
         del STATUSBAR_HT_header._draw_orig
 
 
 def unregister() -> None:
-    """Take them back."""
+    """Remove them."""
     bpy.types.STATUSBAR_HT_header.remove(run_entry)
     bpy.types.VIEW3D_MT_object.remove(object_entry)
     bpy.types.TOPBAR_MT_file_import.remove(import_entry)

@@ -1,4 +1,4 @@
-"""The add-on's preferences: where results are kept, and what of the machine a run may take."""
+"""The add-on's preferences: where results are stored, and how much of the machine a run may use."""
 
 import threading
 import time
@@ -50,18 +50,18 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
 
 def preferences() -> ScanRelightPreferences | None:
     """The add-on's preferences; None where it is registered without being enabled (tests)."""
-    found = bpy.context.preferences.addons.get(PACKAGE)
-    return found.preferences if found else None
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    return addon.preferences if addon else None
 
 
 def results_folder() -> Path:
-    """The folder of results whose own was not chosen and whose .blend was never saved; not made here."""
-    ours = preferences()
-    return home.results_folder(ours.results_folder if ours is not None else "")
+    """The folder of results without a chosen one whose .blend was never saved; not created here."""
+    addon_preferences = preferences()
+    return home.results_folder(addon_preferences.results_folder if addon_preferences is not None else "")
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:
-    """The result folder that `chosen` means for a capture: itself, or where it is empty the capture's own."""
+    """The result folder of a capture: `chosen`, or where that is empty the default."""
     if chosen:
         return Path(bpy.path.abspath(chosen))
     return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
@@ -74,19 +74,21 @@ def chosen_result(scene: bpy.types.Scene) -> Path | None:
 
 
 SIZE_SECONDS: Shown[float] = 30.0
-"""How old the size may be that the preferences show."""
+"""Maximum age of the size that the preferences show."""
 _size: dict = {"folder": None, "time": 0.0, "text": "", "thread": None}
 
 
 def size_text() -> str:
-    """What the results take, as far as is known; it is added up in a thread, as there may be many files."""
+    """Disk space of the results, if known; it is computed in a thread, as there may be many files."""
     folder = results_folder()
     thread = _size["thread"]
     if thread is not None and thread.is_alive():
         return "Adding up"
     if _size["folder"] == folder and time.monotonic() - _size["time"] < SIZE_SECONDS:
         return _size["text"]
-    thread = _size["thread"] = threading.Thread(target=_add_up, args=(folder,), name="scan relight size", daemon=True)
+    thread = _size["thread"] = threading.Thread(
+        target=_compute_size, args=(folder,), name="scan relight size", daemon=True
+    )
     thread.start()
     if not bpy.app.background:
         bpy.app.timers.register(_show_size, first_interval=0.2)
@@ -94,23 +96,23 @@ def size_text() -> str:
 
 
 def forget_size() -> None:
-    """Have the size added up again."""
+    """Have the size computed again."""
     _size["folder"] = None
 
 
 def amount(size: int) -> str:
-    """Bytes as people say them."""
+    """Bytes in GB or MB."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 
-def _add_up(folder: Path) -> None:
+def _compute_size(folder: Path) -> None:
     from ..addon.core.results.cache import results, size
     from ..addon.core.results.store import STAGES
 
-    found = results(folder)
-    whole, stages = (sum(size(one / part) for one in found) for part in ("", STAGES))
+    folders = results(folder)
+    total, stages = (sum(size(path / part) for path in folders) for part in ("", STAGES))
     text = (
-        f"{len(found)} result{'s' * (len(found) != 1)}, {amount(whole)}, of it {amount(stages)} that can be made "
+        f"{len(folders)} result{'s' * (len(folders) != 1)}, {amount(total)}, of it {amount(stages)} that can be made "
         f"again, in {folder}"
     )
     _size.update(folder=folder, time=time.monotonic(), text=text)

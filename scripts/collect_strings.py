@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {"label", "operator", "prop", "menu", "operator_menu_enum"}
 """Methods of a layout whose `text` is displayed."""
-SENTENCES = {"say": 1, "check": 2, "poll_message_set": 0, "told": 0, "needs": 1, "folded": 2}
+SENTENCES = {"say": 1, "check": 2, "poll_message_set": 0, "translated": 0, "needs": 1, "folded": 2}
 """Functions that take a sentence, and its index among their arguments."""
 
 

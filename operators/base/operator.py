@@ -1,4 +1,4 @@
-"""What all operators share: when they can run, errors that become one sentence, files and places that are picked."""
+"""Shared by all operators: `poll`, errors as one sentence, file browser properties, rays under the mouse."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,38 +11,38 @@ from ...addon.core.errors import ScanRelightError
 from .job_operator import active, under_mouse
 
 REPORTED = "Error: "
-"""How Blender begins an operator's error where it raises it as an exception."""
-TURNING = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"}
-"""Events by which the view is turned, which an operator that picks a place leaves to Blender."""
+"""Prefix of an operator's error where Blender raises it as an exception."""
+NAVIGATION_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"}
+"""Events that navigate the view, which an operator that picks a place passes through to Blender."""
 
 
-def needs(fine: Callable, otherwise: str | Callable[[], str]):
-    """Class decorator: `poll` asks this of the context after all that it asks already.
+def needs(condition: Callable, message: str | Callable[[], str]):
+    """Class decorator: `poll` also checks a condition, after those it has already.
 
     Parameters
     ----------
-    fine : callable
-        From the context to whether the operator can run.
-    otherwise : str or callable
-        What the tooltip says where it can't.
+    condition : callable
+        Whether the operator can run, from the context.
+    message : str or callable
+        The tooltip where it can't.
     """
 
-    def asking(cls):
-        before = getattr(cls, "poll", None)
-        before = before.__func__ if before else lambda cls, context: True
+    def decorate(cls):
+        base_poll = getattr(cls, "poll", None)
+        base_poll = base_poll.__func__ if base_poll else lambda cls, context: True
 
         def poll(cls, context):
-            if not before(cls, context):
+            if not base_poll(cls, context):
                 return False
-            if not fine(context):
-                cls.poll_message_set(otherwise if isinstance(otherwise, str) else otherwise())
+            if not condition(context):
+                cls.poll_message_set(message if isinstance(message, str) else message())
                 return False
             return True
 
         cls.poll = classmethod(poll)
         return cls
 
-    return asking
+    return decorate
 
 
 has_scene = needs(lambda context: context.scene is not None, "There is no scene to work in.")
@@ -52,7 +52,7 @@ has_capture = needs(lambda context: context.scene.scan_relight.capture_folder, "
 
 
 def free_scene(cls):
-    """Class decorator: for all that changes the scene, or starts what does."""
+    """Class decorator: for operators that change the scene, or start others that do."""
     return no_run(object_mode(has_scene(cls)))
 
 
@@ -61,10 +61,10 @@ class NothingDone(Exception):
 
 
 class OneSentence:
-    """Tells every error of an operator in one sentence."""
+    """Reports every error of an operator in one sentence."""
 
     def attempt(self, work: Callable[[], set[str]], folder: str = "") -> set[str]:
-        """What `work` returns; cancelled where it fails, and `error.log` of what nobody foresaw goes to `folder`."""
+        """The result of `work`; cancelled where it fails, with an `error.log` in `folder` for unexpected errors."""
         try:
             return work()
         except ScanRelightError as error:
@@ -74,16 +74,16 @@ class OneSentence:
         except NothingDone as error:
             self.report({"WARNING"}, str(error))
         except Exception as error:  # the last line of defence
-            told = str(error).strip()
-            if isinstance(error, RuntimeError) and told.startswith(REPORTED):  # by an operator that was called
-                self.report({"ERROR"}, told.removeprefix(REPORTED))
+            message = str(error).strip()
+            if isinstance(error, RuntimeError) and message.startswith(REPORTED):  # of an operator that was called
+                self.report({"ERROR"}, message.removeprefix(REPORTED))
             else:
                 self.report({"ERROR"}, unexpected(error, folder or bpy.app.tempdir))
         return {"CANCELLED"}
 
 
 class AtOnce(OneSentence):
-    """Does `work` in one undo step; the sentences that it returns are told as `remarks` says."""
+    """Does `work` in one undo step; the sentences that it returns are reported with the level `remarks`."""
 
     bl_options = {"REGISTER", "UNDO"}
     remarks = "WARNING"
@@ -98,7 +98,7 @@ class AtOnce(OneSentence):
 
 
 class Choosing:
-    """Opens the file browser, unless the property `given` holds a path already."""
+    """Opens the file browser, unless the property named `given` has a path already."""
 
     given = ""
 
@@ -109,23 +109,23 @@ class Choosing:
         return {"RUNNING_MODAL"}
 
 
-def _path(subtype: str, name: str, description: str, *options: str, **more):
-    return bpy.props.StringProperty(name=name, description=description, subtype=subtype, options=set(options), **more)
+def _path(subtype: str, name: str, description: str, *options: str, **kwargs):
+    return bpy.props.StringProperty(name=name, description=description, subtype=subtype, options=set(options), **kwargs)
 
 
 folder_property, file_property = partial(_path, "DIR_PATH"), partial(_path, "FILE_PATH")
-"""Properties that hold a path: label, tooltip, options, and what else `StringProperty` takes."""
+"""Properties for a path: label, tooltip, options, and other arguments of `StringProperty`."""
 FOLDERS = bpy.props.BoolProperty(
     name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
 )
-"""What has the file browser show folders alone."""
+"""Property that makes the file browser show folders only."""
 
 
 def mouse_ray(context, event):
     """Origin and direction of the ray under the mouse; None outside the 3D views."""
     for area in context.screen.areas:
-        main = [one for one in area.regions if one.type == "WINDOW" and area.type == "VIEW_3D"][:1]
-        for region in under_mouse(event, main):
+        main_region = [item for item in area.regions if item.type == "WINDOW" and area.type == "VIEW_3D"][:1]
+        for region in under_mouse(event, main_region):
             view = region, area.spaces.active.region_3d, (event.mouse_x - region.x, event.mouse_y - region.y)
             return view3d_utils.region_2d_to_origin_3d(*view), view3d_utils.region_2d_to_vector_3d(*view)
     return None

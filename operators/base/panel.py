@@ -1,5 +1,5 @@
-"""What all panels of the sidebar's tab "Scan Relight" share; Blender cuts a label off at the panel's edge, so that
-sentences are laid over several lines.
+"""Shared by all panels of the sidebar's tab "Scan Relight"; Blender cuts labels off at the panel's edge, so that
+sentences are wrapped.
 """
 
 from functools import lru_cache
@@ -11,25 +11,25 @@ from ...addon.core.naming import numbered
 from .. import translations
 
 MARGIN: Shown[int] = 68
-"""Pixels at an interface scale of 1 that the tabs, the panel's edges and paddings take."""
+"""Width of the tabs, the panel's edges and paddings, in pixels at an interface scale of 1."""
 ICON: Shown[int] = 20
 
 
 def say(layout, sentence: str, icon: str = "NONE") -> None:
-    """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
-    sentence = translations.told(sentence)
+    """Draw `sentence` wrapped to the region's width; the icon is before the first line."""
+    sentence = translations.translated(sentence)
     preferences = bpy.context.preferences
-    scale = preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    scale = preferences.system.ui_scale or 1.0  # 0 without a window
     points = preferences.ui_styles[0].widget.points if preferences.ui_styles else 11.0
-    room = region_width() - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
+    width = region_width() - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(lines(sentence, int(room), points * scale)):
-        column.label(text=line, icon="BLANK1" if number and icon != "NONE" else icon)
+    for index, line in enumerate(lines(sentence, int(width), points * scale)):
+        column.label(text=line, icon="BLANK1" if index and icon != "NONE" else icon)
 
 
 def fields(layout, owner=None, *names: str):
-    """The layout, with labels beside what is entered; below each other the properties of an owner."""
+    """The layout, with split labels; draws the named properties of an owner below each other."""
     layout.use_property_split, layout.use_property_decorate = True, False
     for name in names:
         layout.prop(owner, name)
@@ -37,21 +37,21 @@ def fields(layout, owner=None, *names: str):
 
 
 def folded(layout, key: str, text: str):
-    """What lies within a part that is folded away at first, under a heading; None while it is."""
+    """The body of a sub-panel that is closed by default, under a heading; None while it is closed."""
     header, body = layout.panel(f"scan_relight_{key}", default_closed=True)
     header.label(text=text)
     return body
 
 
 def region_width() -> int:
-    """Pixels that the region is wide that is drawn."""
+    """Width of the current region in pixels."""
     region = bpy.context.region
     return region.width if region else 300
 
 
 @lru_cache(maxsize=512)
 def lines(sentence: str, width: int, size: float) -> tuple[str, ...]:
-    """`sentence` cut at spaces into lines of at most `width` pixels; a word that is longer is cut itself.
+    """`sentence` cut at spaces into lines of at most `width` pixels; a longer word is cut.
 
     Parameters
     ----------
@@ -59,22 +59,22 @@ def lines(sentence: str, width: int, size: float) -> tuple[str, ...]:
     width : int
         In pixels.
     size : float
-        Of the letters, in points times the interface's scale.
+        Of the font, in points times the interface's scale.
     """
-    found, line = [], ""
+    result, line = [], ""
     for word in sentence.split():
-        longer = f"{line} {word}" if line else word
-        if measure(longer, size) <= width:
-            line = longer
+        candidate = f"{line} {word}" if line else word
+        if measure(candidate, size) <= width:
+            line = candidate
             continue
         if line:
-            found.append(line)
+            result.append(line)
         while measure(word, size) > width and len(word) > 4:
-            fits = max(next((n for n in range(len(word), 0, -1) if measure(word[:n], size) <= width), 4), 4)
-            found.append(word[:fits])
-            word = word[fits:]
+            length = max(next((n for n in range(len(word), 0, -1) if measure(word[:n], size) <= width), 4), 4)
+            result.append(word[:length])
+            word = word[length:]
         line = word
-    return (*found, line) if line or not found else tuple(found)
+    return (*result, line) if line or not result else tuple(result)
 
 
 def measure(words: str, size: float) -> float:
@@ -83,18 +83,18 @@ def measure(words: str, size: float) -> float:
 
     blf.size(0, size)
     width = blf.dimensions(0, words)[0]
-    return width if width > 0 else 0.55 * size * len(words)  # no font is loaded where there is no window
+    return width if width > 0 else 0.55 * size * len(words)  # no font is loaded without a window
 
 
 class SidebarPanel:
-    """A part of the tab. `bl_order`: Capture 0, Recover 1, Results 2, Look 3, Relight 4, Export 5."""
+    """A panel of the tab. `bl_order`: Capture 0, Recover 1, Results 2, Look 3, Relight 4, Export 5."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scan Relight"
     bl_translation_context = translations.OWN
     manual = ""
-    """Page of the documentation that "?" in the header opens; '' has none."""
+    """Page of the documentation for "?" in the header; '' without."""
 
     say = staticmethod(say)
 
@@ -112,17 +112,17 @@ class NamedRows:
 
     @staticmethod
     def name(layout, name: str, icon: str = "NONE") -> None:
-        """Write a name; its number has a column of its own, so that a narrow panel cuts the class and never that."""
+        """Draw a name; its number has its own column, so that a narrow panel never cuts off the number."""
         kind, number = numbered(name)
         row = layout.row()
         row.label(text=kind, icon=icon, translate=False)
         if number:
-            last = row.row()
-            last.alignment = "RIGHT"
-            last.ui_units_x = 0.5 + 0.45 * len(number)
-            last.label(text=number, translate=False)
+            number_row = row.row()
+            number_row.alignment = "RIGHT"
+            number_row.ui_units_x = 0.5 + 0.45 * len(number)
+            number_row.label(text=number, translate=False)
 
 
 def places(keys: list) -> list[int]:
-    """Where each of `keys` stands when they are sorted, as `UIList.filter_items` returns it."""
+    """New index of each of `keys` in sorted order, as `UIList.filter_items` returns it."""
     return bpy.types.UI_UL_list.sort_items_helper(list(enumerate(keys)), key=lambda pair: pair[1])

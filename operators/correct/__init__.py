@@ -1,1 +1,1 @@
-"""What the artist says of objects, and the refit that follows."""
+"""The artist's statements on objects, and the refit that follows."""

@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` by which an artist says what an object is, or paints what no frame saw."""
+"""`bpy.ops.scan_relight.*` for statements on what an object is, and for painting what no frame saw."""
 
 from pathlib import Path
 
@@ -14,30 +14,30 @@ from ...addon.bridge.results import file
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator
-from ..base.operator import TURNING, AtOnce, OneSentence, has_scene, mouse_ray, needs, no_run, object_mode
+from ..base.operator import NAVIGATION_EVENTS, AtOnce, OneSentence, has_scene, mouse_ray, needs, no_run, object_mode
 from .props import ALBEDO, SMOOTH_ANGLE, STATEMENTS
 
 
 def chosen(context) -> list[bpy.types.Object]:
-    """The recovered objects that are selected; the active one, where it is none of those, alone."""
+    """The selected recovered objects; only the active one, where it is not among those."""
     active = context.view_layer.objects.active if context.view_layer else None
-    found = [thing for thing in context.selected_objects if corrections.correctable(thing)]
-    if corrections.correctable(active) and active not in found:
+    selected = [obj for obj in context.selected_objects if corrections.correctable(obj)]
+    if corrections.correctable(active) and active not in selected:
         return [active]
-    return found
+    return selected
 
 
 def on_selected(cls):
-    """Class decorator: for what is said of the selected objects."""
+    """Class decorator: for operators on the selected objects."""
     return needs(chosen, "Select a recovered object first.")(object_mode(has_scene(cls)))
 
 
 def in_room(cls):
-    """Class decorator: for what is said of any object of the room."""
-    any_there = needs(
+    """Class decorator: for operators on any object of the room."""
+    has_correctable = needs(
         lambda context: any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
     )
-    return any_there(object_mode(has_scene(cls)))
+    return has_correctable(object_mode(has_scene(cls)))
 
 
 class CorrectOperator(AtOnce):
@@ -48,37 +48,37 @@ class CorrectOperator(AtOnce):
 
 @no_run
 class RefitOperator(OneSentence, JobOperator):
-    """States something of the selected objects (`state`) and fits them again, all in one undo step."""
+    """Makes a statement on the selected objects (`state`) and fits them again, all in one undo step."""
 
     bl_options = {"REGISTER", "UNDO"}
     always = False
     asks_for = ""
-    """Property that is asked for where nobody gave it: from a menu or the search."""
+    """Property to ask for where it is not set: from a menu or the search."""
 
     def invoke(self, context, event):
         if self.asks_for and not self.properties.is_property_set(self.asks_for):
             return context.window_manager.invoke_props_dialog(self)
         return self.execute(context)
 
-    def state(self, context, things) -> list[bpy.types.Object]:
-        """Say it; returns the objects that are to be fitted again."""
-        return things
+    def state(self, context, objects) -> list[bpy.types.Object]:
+        """Apply the statement; returns the objects to fit again."""
+        return objects
 
     def execute(self, context):
-        """State it, then refit behind the window, or here in the background."""
+        """Apply the statement, then refit beside the window, or right here in the background."""
         self._stated = False
 
         def work() -> set[str]:
-            things = self.state(context, chosen(context))
+            objects = self.state(context, chosen(context))
             self._stated = True
             if not self.always and not context.scene.scan_relight_correct.refit_automatically:
                 return {"FINISHED"}
-            return self.refit(context, things)
+            return self.refit(context, objects)
 
         return self._verdict(self.attempt(work))
 
-    def refit(self, context, things):
-        folder, words, before = refitted.words(context.scene, things)
+    def refit(self, context, objects):
+        folder, words, before = refitted.words(context.scene, objects)
         facts = {"title": self.bl_label, "result_folder": str(folder), "before": before}
         if not bpy.app.background:
             return self.start(context, command(words, **FOLLOWED), **facts)
@@ -104,7 +104,7 @@ class RefitOperator(OneSentence, JobOperator):
         return super()._leave(context, self._verdict(verdict))
 
     def _verdict(self, verdict):
-        """What was stated stays, and is an undo step, also where the refit was stopped or failed."""
+        """The statement stays, and is an undo step, even where the refit was stopped or failed."""
         return {"FINISHED"} if verdict == {"CANCELLED"} and self._stated and not self.always else verdict
 
 
@@ -134,10 +134,10 @@ class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
         item = next(item for item in STATEMENTS if item[0] == properties.model)
         return f"The selected objects are: {item[1].lower()}. {item[2]}"
 
-    def state(self, context, things):
-        for thing in things:
-            corrections.give(thing, model=self.model)
-        return things
+    def state(self, context, objects):
+        for obj in objects:
+            corrections.give(obj, model=self.model)
+        return objects
 
 
 @needs(
@@ -159,19 +159,19 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def state(self, context, things):
-        other = context.view_layer.objects.active if len(things) > 1 else context.scene.scan_relight_correct.like
+    def state(self, context, objects):
+        other = context.view_layer.objects.active if len(objects) > 1 else context.scene.scan_relight_correct.like
         if self.object_id >= 0:
-            other = corrections.by_id(things[0], self.object_id)
+            other = corrections.by_id(objects[0], self.object_id)
         if not corrections.correctable(other):
             raise BadInputError("The other object is none of this room's recovered objects; choose one of those.")
-        others = [thing for thing in things if thing != other]
+        others = [obj for obj in objects if obj != other]
         if not others:
             raise BadInputError(f"'{other.name}' is the other object itself; select the ones that are like it.")
         if corrections.result_folder(other) != corrections.folder_for(others):
             raise BadInputError(f"'{other.name}' belongs to another result; choose an object of the same room.")
-        for thing in others:
-            corrections.give(thing, same_as=other[OBJECT_ID])
+        for obj in others:
+            corrections.give(obj, same_as=other[OBJECT_ID])
         return others
 
 
@@ -194,20 +194,20 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        what = "everything that is given" if properties.key == "all" else f"the {_KEYS[properties.key]} that is given"
-        return f"Take back {what} of the selected objects: show, and fit, what the frames say"
+        target = "everything that is given" if properties.key == "all" else f"the {_KEYS[properties.key]} that is given"
+        return f"Take back {target} of the selected objects: show, and fit, what the frames say"
 
-    def state(self, context, things):
-        """Take it back; only what a refit was made with asks for another one."""
-        things = [thing for thing in things if corrections.given(thing)]
-        self._made = any(corrections.entry(thing).get("given") for thing in things)
-        for thing in things:
-            corrections.take_back(thing, *(() if self.key == "all" else (self.key,)))
-        return things
+    def state(self, context, objects):
+        """Take it back; another refit is needed only where the result was made with it."""
+        objects = [obj for obj in objects if corrections.given(obj)]
+        self._made = any(corrections.entry(obj).get("given") for obj in objects)
+        for obj in objects:
+            corrections.take_back(obj, *(() if self.key == "all" else (self.key,)))
+        return objects
 
-    def refit(self, context, things):
-        """Only where the result was made with what is taken back."""
-        return super().refit(context, things) if self._made else {"FINISHED"}
+    def refit(self, context, objects):
+        """Only where the result was made with the statements that are taken back."""
+        return super().refit(context, objects) if self._made else {"FINISHED"}
 
 
 @in_room
@@ -223,11 +223,11 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
     )
 
     def work(self, context):
-        things = filter(corrections.correctable, context.scene.objects) if self.everything else chosen(context)
-        things = list(things)
-        if not things:
+        objects = filter(corrections.correctable, context.scene.objects) if self.everything else chosen(context)
+        objects = list(objects)
+        if not objects:
             raise BadInputError("No recovered object is selected; select some, or choose the whole room.")
-        count = corrections.smooth(things, self.angle)
+        count = corrections.smooth(objects, self.angle)
         return [f"{count} object{'s' * (count != 1)} shaded {'smooth' if self.angle else 'flat'}"]
 
 
@@ -241,16 +241,16 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
     albedo: ALBEDO
     asks_for = "albedo"
 
-    def state(self, context, things):
-        thing = context.view_layer.objects.active
-        thing = thing if thing in things else things[0]
-        corrections.say_white(thing, self.albedo)
+    def state(self, context, objects):
+        obj = context.view_layer.objects.active
+        obj = obj if obj in objects else objects[0]
+        corrections.say_white(obj, self.albedo)
         self.report(
             {"INFO"},
-            f"The whole room's albedo is scaled so that '{thing.name}' has "
-            f"{', '.join(f'{part:.2f}' for part in self.albedo)}",
+            f"The whole room's albedo is scaled so that '{obj.name}' has "
+            f"{', '.join(f'{channel:.2f}' for channel in self.albedo)}",
         )
-        return [thing]
+        return [obj]
 
 
 @needs(lambda context: corrections.white_of(context.view_layer.objects.active) is not None, "No white is given.")
@@ -260,9 +260,9 @@ class SCAN_RELIGHT_OT_white_back(RefitOperator, bpy.types.Operator):
 
     bl_label = "No Known White"
 
-    def state(self, context, things):
+    def state(self, context, objects):
         corrections.take_white_back(context.view_layer.objects.active)
-        return things[:1]
+        return objects[:1]
 
 
 @in_room
@@ -298,7 +298,7 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
             self._end(context)
             return {"CANCELLED"}
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
-            return {"PASS_THROUGH"} if event.type in TURNING | {"MOUSEMOVE", "TIMER"} else {"RUNNING_MODAL"}
+            return {"PASS_THROUGH"} if event.type in NAVIGATION_EVENTS | {"MOUSEMOVE", "TIMER"} else {"RUNNING_MODAL"}
         ray = mouse_ray(context, event)
         if ray is None:
             return {"RUNNING_MODAL"}
@@ -306,7 +306,7 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
         self.origin, self.direction = ray
         return self.execute(context)
 
-    def state(self, context, things):
+    def state(self, context, objects):
         hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
         if hit is None or not corrections.correctable(hit.thing):
             raise BadInputError("There is no recovered object at that spot; click on one.")
@@ -333,12 +333,12 @@ class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
     )
 
     def work(self, context):
-        thing = context.view_layer.objects.active
-        if thing not in chosen(context):
+        obj = context.view_layer.objects.active
+        if obj not in chosen(context):
             raise BadInputError("Make the object that is to be painted the active one: click on it.")
-        colour = corrections.effective(thing).get("base_color")
-        unseen.paint(context, thing, context.scene.scan_relight.images, colour, self.masked)
-        return [f"Painting '{unseen.painted(thing).name}'; leave Texture Paint for object mode when done"]
+        colour = corrections.effective(obj).get("base_color")
+        unseen.paint(context, obj, context.scene.scan_relight.images, colour, self.masked)
+        return [f"Painting '{unseen.painted(obj).name}'; leave Texture Paint for object mode when done"]
 
 
 @on_selected
@@ -375,5 +375,5 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
 
 @bpy.app.handlers.persistent
 def keep_painted(*_) -> None:
-    """Before the file is saved: what was painted goes with it."""
+    """Before the file is saved: painted images are saved with it."""
     unseen.keep_painted()

@@ -1,6 +1,6 @@
-"""What the panel Correct shows: an object's values as they are, and what was chosen for the next click.
+"""Properties of the panel Correct: an object's values, and choices for the next operator.
 
-The properties of objects hold nothing: they read and write what the bridge keeps with object and material.
+The properties of objects store nothing: they read and write what the bridge stores with object and material.
 """
 
 from math import radians
@@ -12,12 +12,12 @@ from ...addon.core.brdf.lambertian import LAMBERTIAN
 from ...addon.core.brdf.registry import models, shown
 from ...addon.core.errors import ScanRelightError
 
-_GIVEN = [one for one in models() if one.can_be_given]
-_SHOWN = sorted(_GIVEN, key=lambda one: (one.gives_light, one.has_diffuse, not one.has_lobe))
-STATEMENTS = [(one.name, one.label, one.text) for one in _SHOWN]
+_GIVEN = [brdf for brdf in models() if brdf.can_be_given]
+_SORTED = sorted(_GIVEN, key=lambda brdf: (brdf.gives_light, brdf.has_diffuse, not brdf.has_lobe))
+STATEMENTS = [(brdf.name, brdf.label, brdf.text) for brdf in _SORTED]
 _ITEMS = [
-    (one.name, one.label, one.text, number)
-    for number, one in enumerate((*_GIVEN, *(one for one in models() if not one.can_be_given)))
+    (brdf.name, brdf.label, brdf.text, number)
+    for number, brdf in enumerate((*_GIVEN, *(brdf for brdf in models() if not brdf.can_be_given)))
 ]
 SMOOTH_ANGLE = bpy.props.FloatProperty(
     name="Angle",
@@ -39,24 +39,24 @@ ALBEDO = bpy.props.FloatVectorProperty(
 )
 
 
-def targets(context, thing: bpy.types.Object) -> list[bpy.types.Object]:
-    """The objects that a change of one in the panel means: all selected ones, where it is the active one of those."""
-    chosen = [one for one in getattr(context, "selected_objects", ()) if corrections.correctable(one)]
-    everyone = context.scene.scan_relight_correct.all_selected and thing == context.view_layer.objects.active
-    return chosen if everyone and thing in chosen else [thing]
+def targets(context, obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that a change in the panel applies to: all selected ones, if the changed one is their active one."""
+    chosen = [selected for selected in getattr(context, "selected_objects", ()) if corrections.correctable(selected)]
+    to_all = context.scene.scan_relight_correct.all_selected and obj == context.view_layer.objects.active
+    return chosen if to_all and obj in chosen else [obj]
 
 
-def _value(group, key: str, otherwise):
-    thing = group.id_data
-    value = corrections.effective(thing).get(key) if corrections.correctable(thing) else None
-    return otherwise if value is None else value
+def _value(group, key: str, default):
+    obj = group.id_data
+    value = corrections.effective(obj).get(key) if corrections.correctable(obj) else None
+    return default if value is None else value
 
 
 def _give(group, **values) -> None:
-    for thing in targets(bpy.context, group.id_data):
-        if corrections.correctable(thing):
+    for obj in targets(bpy.context, group.id_data):
+        if corrections.correctable(obj):
             try:
-                corrections.give(thing, **values)
+                corrections.give(obj, **values)
             except ScanRelightError:
                 continue  # a lamp has no roughness: the panel shows no such property, and a script sees no change
 
@@ -67,17 +67,17 @@ def _f0(group) -> float:
 
 
 def _colour(group):
-    bare = shown(_value(group, "model", "")).lobe_alone
-    value = _value(group, "f0" if bare else "base_color", (0.5, 0.5, 0.5))
+    lobe_alone = shown(_value(group, "model", "")).lobe_alone
+    value = _value(group, "f0" if lobe_alone else "base_color", (0.5, 0.5, 0.5))
     return tuple(value) if hasattr(value, "__len__") else (value,) * 3
 
 
 def _give_colour(group, value) -> None:
     colour = list(value)
-    for thing in targets(bpy.context, group.id_data):
-        if corrections.correctable(thing):
-            brdf = shown(corrections.effective(thing)["model"])
-            corrections.give(thing, **{"f0" if brdf.lobe_alone else "base_color": colour})
+    for obj in targets(bpy.context, group.id_data):
+        if corrections.correctable(obj):
+            brdf = shown(corrections.effective(obj)["model"])
+            corrections.give(obj, **{"f0" if brdf.lobe_alone else "base_color": colour})
 
 
 class ScanRelightCorrection(bpy.types.PropertyGroup):
@@ -143,7 +143,7 @@ class ScanRelightCorrecting(bpy.types.PropertyGroup):
         name="Like",
         description="The object whose highlight the selected ones have",
         type=bpy.types.Object,
-        poll=lambda self, thing: corrections.correctable(thing),
+        poll=lambda self, obj: corrections.correctable(obj),
     )
     albedo: ALBEDO
     smooth_angle: SMOOTH_ANGLE

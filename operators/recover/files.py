@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` for what lies on disk: File > Import, files that are dropped, finished results."""
+"""`bpy.ops.scan_relight.*` for files on disk: File > Import, dropped files, finished results."""
 
 from functools import partial
 from pathlib import Path
@@ -31,7 +31,7 @@ FILTER = "transforms*.json;materials.json;*.ply;*.obj;*.glb;*.gltf;cameras.bin;c
 
 
 def show_tab(context) -> None:
-    """Open the sidebar of the window's 3D views at our tab."""
+    """Open the sidebar of the window's 3D views on our tab."""
     for area in context.screen.areas if context.screen else ():
         if area.type != "VIEW_3D":
             continue
@@ -41,8 +41,8 @@ def show_tab(context) -> None:
 
 
 def _to_front(area) -> bool:
-    """Show our tab in an area's sidebar; one that was never drawn has no tabs yet."""
-    region = next((one for one in area.regions if one.type == "UI"), None)
+    """Show our tab in an area's sidebar; one that was never drawn has no tabs yet. Returns whether it could."""
+    region = next((item for item in area.regions if item.type == "UI"), None)
     try:
         region.active_panel_category = SidebarPanel.bl_category
     except (AttributeError, TypeError):
@@ -51,7 +51,7 @@ def _to_front(area) -> bool:
 
 
 def _later(window, pointer: int) -> None:
-    """Once more after the sidebar was drawn; windows and areas may be gone by then."""
+    """Try again after the sidebar was drawn; windows and areas may have been closed by then."""
     if window in bpy.context.window_manager.windows[:]:
         for area in window.screen.areas:
             if area.as_pointer() == pointer:
@@ -62,7 +62,7 @@ def given_path(operator) -> Path:
     """The path in the properties that Blender fills: `filepath`, or `directory` with the first of `files`."""
     if operator.filepath:
         return Path(bpy.path.abspath(operator.filepath))
-    names = [one.name for one in operator.files if one.name]
+    names = [item.name for item in operator.files if item.name]
     if operator.directory:
         return Path(bpy.path.abspath(operator.directory), *names[:1])
     raise BadInputError("Choose the folder of a scan first, or one of its files.")
@@ -87,7 +87,7 @@ class FileOperator(OneSentence):
         return self.attempt(lambda: self.open(context))
 
     def open(self, context) -> set[str]:
-        """Open a result; choose a scan, and do what was asked for with it."""
+        """Open a result; or choose a scan, and do with it what `then` says."""
         content = folders.of_path(given_path(self))
         if content.kind == folders.RESULT:
             return bpy.ops.scan_relight.open_result(folder=str(content.folder))
@@ -101,7 +101,7 @@ class FileOperator(OneSentence):
 
 
 def choose(context, content: folders.Content) -> None:
-    """Choose a scan in the panel and show it; raises `BadInputError` with what is wrong with another folder."""
+    """Choose a scan in the panel and show it; raises `BadInputError` for any other folder."""
     if content.kind == folders.WAY and len(content.captures) == 1 and not content.results:
         content = folders.look_into(content.captures[0])
     if content.kind != folders.CAPTURE:
@@ -138,7 +138,7 @@ class SCAN_RELIGHT_OT_drop(FileOperator, bpy.types.Operator):
         return self.attempt(lambda: self.offer(context))
 
     def offer(self, context) -> set[str]:
-        """A result is opened at once; a scan is chosen, and running it is offered."""
+        """Open a result at once; choose a scan and offer to run it."""
         content = folders.of_path(given_path(self))
         if content.kind == folders.RESULT:
             return self.execute(context)

@@ -1,4 +1,4 @@
-"""What was found in captures, by folder and way of reading. Kept while Blender runs, never in the file."""
+"""Findings of captures, by folder and reading options. Kept in memory, never in the file."""
 
 import json
 import time
@@ -12,55 +12,55 @@ from ...addon.core.kinds import Shown
 from ..base.job_operator import redraw
 from . import reading_props
 
-_found: dict[tuple, jobs.Job | dict | str] = {}
-FRESH: Shown[float] = 2.0
-"""Seconds for which what a folder is stays known: panels are drawn often, disks are slow."""
+_findings: dict[tuple, jobs.Job | dict | str] = {}
+CACHE_SECONDS: Shown[float] = 2.0
+"""Seconds for which the content of a folder is cached: panels are drawn often, disks are slow."""
 _contents: dict[str, tuple[float, Content]] = {}
 
 
 def key(choices) -> tuple:
-    """What a finding is found by: the capture's folder and how it is read."""
+    """Key of a finding: the capture's folder and reading options."""
     return bpy.path.abspath(choices.capture_folder), *reading_props.options(choices.reading)
 
 
 def wrong_folder(choices) -> Content | None:
-    """What the chosen folder is where it is no capture; None where it is one, was read, or its format was given."""
+    """Content of the chosen folder if it is no capture; None where it is one, was read, or its format was given."""
     if not choices.capture_folder or choices.reading.reading_format != reading_props.FOUND:
         return None
-    if isinstance(_found.get(key(choices)), dict):
+    if isinstance(_findings.get(key(choices)), dict):
         return None
     folder = bpy.path.abspath(choices.capture_folder)
-    read, content = _contents.get(folder, (0.0, None))
-    if content is None or time.monotonic() - read > FRESH:
+    read_at, content = _contents.get(folder, (0.0, None))
+    if content is None or time.monotonic() - read_at > CACHE_SECONDS:
         content = look_into(folder)
-        _contents.clear()  # of one folder at a time
+        _contents.clear()  # one folder at a time
         _contents[folder] = time.monotonic(), content
     return None if content.kind == CAPTURE else content
 
 
 def look(choices) -> jobs.Job | dict | str | None:
-    """A job that still reads, the facts as `describe` gives them, a sentence on what is wrong, or None."""
-    found = _found.get(key(choices))
-    if isinstance(found, jobs.Job) and not found.running:
-        found = _found[key(choices)] = _result(found)
-    return found
+    """A job that is still reading, the facts of `describe`, an error sentence, or None."""
+    finding = _findings.get(key(choices))
+    if isinstance(finding, jobs.Job) and not finding.running:
+        finding = _findings[key(choices)] = _result(finding)
+    return finding
 
 
-def put(choices, found: dict | str) -> None:
-    """Keep what was found."""
-    _found[key(choices)] = found
+def put(choices, finding: dict | str) -> None:
+    """Store a finding."""
+    _findings[key(choices)] = finding
 
 
 def begin(choices) -> None:
-    """Read the capture beside the window; a panel shows what was found once it is there."""
-    for one in _found.values():
-        if isinstance(one, jobs.Job):
-            one.stop()  # the folder before: nobody waits for it any more
+    """Read the capture beside the window; a panel shows the finding once there is one."""
+    for finding in _findings.values():
+        if isinstance(finding, jobs.Job):
+            finding.stop()  # of the previous folder: no longer needed
     folder, *options = key(choices)
-    found = _found[key(choices)] = jobs.Job(command(["info", folder, *options], json=True, stop_with_stdin=True))
+    job = _findings[key(choices)] = jobs.Job(command(["info", folder, *options], json=True, stop_with_stdin=True))
 
     def watch():
-        if found.running:
+        if job.running:
             return 0.2
         redraw(bpy.context)
         return None
@@ -69,7 +69,7 @@ def begin(choices) -> None:
 
 
 def facts(job: jobs.Job) -> dict:
-    """What a job that runs `info --json` said; raises ValueError where that is no JSON."""
+    """The output of a job that runs `info --json`; raises ValueError where that is no JSON."""
     return json.loads(job.text[job.text.index("{") :])
 
 
@@ -83,9 +83,9 @@ def _result(job: jobs.Job) -> dict | str:
 
 
 def forget() -> None:
-    """Know nothing any more."""
-    for one in _found.values():
-        if isinstance(one, jobs.Job):
-            one.stop()
-    _found.clear()
+    """Clear all findings."""
+    for finding in _findings.values():
+        if isinstance(finding, jobs.Job):
+            finding.stop()
+    _findings.clear()
     _contents.clear()

@@ -1,4 +1,4 @@
-"""The tab's first part: which capture, what was found in it, and what is wrong with it."""
+"""The tab's first part: the capture, its content, and warnings."""
 
 import bpy
 
@@ -8,9 +8,11 @@ from ...addon.core.naming import object_name
 from ..base.panel import SidebarPanel, fields, folded
 from . import findings, reading_props
 
-SHOWN: Shown[int] = 12
-"""Objects that are listed before the rest is counted."""
-TOLD = "capture format triangles vertices area_m2 bounds_m extent_m frames resolutions masks instances warnings".split()
+MAX_LISTED: Shown[int] = 12
+"""Maximum number of objects that are listed; the others are counted."""
+KNOWN_FACTS = (
+    "capture format triangles vertices area_m2 bounds_m extent_m frames resolutions masks instances warnings".split()
+)
 
 
 class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
@@ -31,20 +33,20 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         if wrong is not None:
             self.wrong(layout, context, wrong)
             return
-        found = findings.look(choices) if choices.capture_folder else None
+        finding = findings.look(choices) if choices.capture_folder else None
         row = layout.row()
-        row.enabled = not isinstance(found, jobs.Job)
-        row.operator("scan_relight.check_capture", text="Check" if found is None else "Check Again", icon="VIEWZOOM")
+        row.enabled = not isinstance(finding, jobs.Job)
+        row.operator("scan_relight.check_capture", text="Check" if finding is None else "Check Again", icon="VIEWZOOM")
         row.operator("scan_relight.run", text="Import", icon="IMPORT").target = "import_capture"
-        if isinstance(found, jobs.Job):
+        if isinstance(finding, jobs.Job):
             layout.progress(factor=0.0, text="Reading the capture", type="RING")
-        elif isinstance(found, str):
-            self.say(layout, found, "CANCEL")
-        elif found is not None:
-            self.facts(layout, context, found)
+        elif isinstance(finding, str):
+            self.say(layout, finding, "CANCEL")
+        elif finding is not None:
+            self.facts(layout, context, finding)
 
     def wrong(self, layout, context, content) -> None:
-        """Why the folder is no capture, and a button for each that is meant perhaps."""
+        """Why the folder is no capture, and a button for each folder that may be meant."""
         column = layout.column()
         self.say(column, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
         for folder in content.captures:
@@ -55,38 +57,40 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             text = "Open It" if folder == content.folder else f"Open Result '{folder.name}'"
             column.operator("scan_relight.open_result", text=text, icon="IMPORT").folder = str(folder)
 
-    def facts(self, layout, context, found: dict) -> None:
-        """What `describe` tells of a capture; keys that are not known here are shown as they come."""
-        warnings = found.get("warnings", ())
+    def facts(self, layout, context, facts: dict) -> None:
+        """The facts of `describe` on a capture; unknown keys are shown as they are."""
+        warnings = facts.get("warnings", ())
         if not warnings:
             self.say(layout, "Nothing is wrong with it.", "CHECKMARK")
         for sentence in warnings:
             self.say(layout, sentence, "ERROR")
-        sizes = ", ".join(f"{count} of {size}" for size, count in found.get("resolutions", {}).items())
-        masks = f", {found['masks']} with a mask" if found.get("masks") else ""
-        self.say(layout, f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}", "CAMERA_DATA")
-        extent = " x ".join(f"{length:.2f}" for length in found.get("extent_m", ()))
+        sizes = ", ".join(f"{count} of {size}" for size, count in facts.get("resolutions", {}).items())
+        masks = f", {facts['masks']} with a mask" if facts.get("masks") else ""
+        self.say(layout, f"{facts.get('frames', 0)} frames ({facts.get('format', '')}): {sizes}{masks}", "CAMERA_DATA")
+        extent = " x ".join(f"{length:.2f}" for length in facts.get("extent_m", ()))
         self.say(
             layout,
-            f"{found.get('triangles', 0):,} triangles, {found.get('area_m2', 0):.1f} m\u00b2, {extent} m",
+            f"{facts.get('triangles', 0):,} triangles, {facts.get('area_m2', 0):.1f} m\u00b2, {extent} m",
             "MESH_DATA",
         )
-        for name, value in found.items():
-            if name not in TOLD:
+        for name, value in facts.items():
+            if name not in KNOWN_FACTS:
                 self.other(layout, context, name, value)
-        instances = found.get("instances", ())
+        instances = facts.get("instances", ())
         if body := folded(layout, "objects", f"{len(instances)} objects"):
             column = body.column(align=True)
             column.scale_y = 0.8
-            for one in instances[:SHOWN]:
-                column.label(text=f"{object_name(one['class_name'], one['object_id'])}: {one['triangles']:,} triangles")
-            if len(instances) > SHOWN:
-                column.label(text=f"and {len(instances) - SHOWN} more")
+            for entry in instances[:MAX_LISTED]:
+                column.label(
+                    text=f"{object_name(entry['class_name'], entry['object_id'])}: {entry['triangles']:,} triangles"
+                )
+            if len(instances) > MAX_LISTED:
+                column.label(text=f"and {len(instances) - MAX_LISTED} more")
 
     def other(self, layout, context, name: str, value) -> None:
-        """A fact that a reader adds."""
+        """A fact added by a reader."""
         label = name.replace("_", " ").capitalize()
-        if isinstance(value, (list, tuple)) and all(isinstance(one, str) for one in value):
+        if isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in value):
             for sentence in value:
                 self.say(layout, sentence, "INFO")
         elif isinstance(value, (str, int, float)) and value not in ("", 0, None) and not isinstance(value, bool):

@@ -25,15 +25,15 @@ GROUPS = (
 )
 OTHER = "More"
 CHANGES: Shown[int] = 8
-"""Objects that are listed as different since the run before."""
+"""Maximum number of objects that are listed as changed since the previous run."""
 
 
 def groups() -> list[tuple[str, list[str]]]:
-    """Every setting under its heading; one that has none comes last."""
+    """Every setting under its heading; those without one come last."""
     names = [info.name for info in setting_infos()]
-    placed = {name for _, some in GROUPS for name in some}
-    found = [(heading, [name for name in some if name in names]) for heading, some in GROUPS]
-    return [*found, (OTHER, [name for name in names if name not in placed])]
+    placed = {name for _, group in GROUPS for name in group}
+    grouped = [(heading, [name for name in group if name in names]) for heading, group in GROUPS]
+    return [*grouped, (OTHER, [name for name in names if name not in placed])]
 
 
 class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
@@ -61,7 +61,9 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         fields(layout, choices.settings, "detail", "shading_rays")
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
-            self.say(layout, f"Goes into '{home.shown(preferences.chosen_result(context.scene))}'.", "FILE_FOLDER")
+            self.say(
+                layout, f"Goes into '{home.display_path(preferences.chosen_result(context.scene))}'.", "FILE_FOLDER"
+            )
         layout.prop(choices, "images")
         if choices.images == images.FOLDER and not bpy.data.filepath:
             self.say(layout, images.NEVER_SAVED, "ERROR")
@@ -74,7 +76,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
                     fields(column, choices.settings, *names)
 
     def start(self, context) -> None:
-        """The button; where a run was stopped, it goes on, and there is another to start anew."""
+        """The button; where a run was stopped, it resumes, and there is another one to start again."""
         choices = context.scene.scan_relight
         folder = preferences.chosen_result(context.scene)
         stage = goes_on_with(folder) if folder is not None else ""
@@ -87,8 +89,8 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
                 self.layout,
                 f"Goes on with: {LABELS[stage]}. What is finished is kept, where its settings are the same.",
             )
-            again = self.layout.operator("scan_relight.run", text="Start Anew", icon="FILE_REFRESH")
-            again.target, again.from_stage = "recover", STAGES[0]
+            button = self.layout.operator("scan_relight.run", text="Start Anew", icon="FILE_REFRESH")
+            button.target, button.from_stage = "recover", STAGES[0]
 
     def progress(self, job: jobs.Job) -> None:
         factor, text = bar(job)
@@ -99,15 +101,15 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         column.operator("scan_relight.stop", text="Stop", icon="CANCEL")
 
     def room(self, context) -> None:
-        """What differs since the run before, and the way into the artist's own scene."""
+        """Changes since the previous run, and the button to link the room into another scene."""
         scene, layout = context.scene, self.layout
         if not scene.get(OWN_SCENE):
             return
-        changes = room_changes.shown(scene)
+        changes = room_changes.stored_changes(scene)
         if changes:
             if body := folded(layout, "changes", f"{len(changes)} objects differ from the run before"):
-                for one in changes[:CHANGES]:
-                    self.say(body, one["text"], "DOT")
+                for change in changes[:CHANGES]:
+                    self.say(body, change["text"], "DOT")
         if len(bpy.data.scenes) > 1:
             layout.operator_menu_enum("scan_relight.link_room", "scene", icon="LINKED")
 

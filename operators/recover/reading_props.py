@@ -46,7 +46,7 @@ NAMES = tuple(ReadingProps.__annotations__)
 
 
 def reading(owner) -> Reading:
-    """What `owner`'s properties are for `read_capture`."""
+    """`owner`'s properties as the argument of `read_capture`."""
 
     def import_mesh(path: Path):
         from ...addon.bridge.data.import_mesh import import_mesh as through_blender
@@ -68,8 +68,8 @@ def reading(owner) -> Reading:
 
 
 def options(owner) -> list[str]:
-    """What `owner`'s properties are on the command line."""
-    asked = reading(owner)
-    given = {name: getattr(asked, name) for name in ("format", "mesh", "transfer", "exposures", "convention")}
-    words = [word for name, value in given.items() if value for word in (f"--{name}", str(value))]
-    return [*words, "--outside"] if asked.outside else words
+    """`owner`'s properties as options of the command line."""
+    requested = reading(owner)
+    values = {name: getattr(requested, name) for name in ("format", "mesh", "transfer", "exposures", "convention")}
+    words = [word for name, value in values.items() if value for word in (f"--{name}", str(value))]
+    return [*words, "--outside"] if requested.outside else words

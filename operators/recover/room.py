@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` for the room in the file: in another scene, its materials as assets, or taken off."""
+"""`bpy.ops.scan_relight.*` for the room in the file: in another scene, its materials as assets, or removed."""
 
 import bpy
 
@@ -11,29 +11,29 @@ from ..base.operator import AtOnce, NothingDone, has_scene, needs, object_mode
 from ..results.look import needs_recovered
 
 
-def show(before: bpy.types.Scene, scene: bpy.types.Scene) -> None:
-    """Show a room's own scene in the window; its panel has what was chosen in the scene `before`."""
-    if scene != before:
-        take(scene.scan_relight, before.scan_relight)
+def show(previous: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+    """Show a room's own scene in the window; its panel gets the choices of the scene `previous`."""
+    if scene != previous:
+        copy_properties(scene.scan_relight, previous.scan_relight)
     parts.show(bpy.context.window, scene)
 
 
-def take(choices, before) -> None:
-    """Copy all that was chosen from one group of properties to another of its kind."""
-    for name, info in before.bl_rna.properties.items():
+def copy_properties(choices, source) -> None:
+    """Copy all properties of a group to another one of the same type."""
+    for name, info in source.bl_rna.properties.items():
         if name in ("rna_type", "name"):
             continue
         if info.type == "POINTER":
-            take(getattr(choices, name), getattr(before, name))
-        elif not info.is_readonly and getattr(choices, name) != getattr(before, name):
-            setattr(choices, name, getattr(before, name))
+            copy_properties(getattr(choices, name), getattr(source, name))
+        elif not info.is_readonly and getattr(choices, name) != getattr(source, name):
+            setattr(choices, name, getattr(source, name))
 
 
-_items: list[tuple[str, str, str]] = []  # Blender keeps no reference of its own
+_items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the items
 
 
-def others(operator, context) -> list[tuple[str, str, str]]:
-    """The scenes that a room of this one can go to."""
+def scene_items(operator, context) -> list[tuple[str, str, str]]:
+    """The other scenes, as items of an enum."""
     _items[:] = [
         (scene.name, scene.name, "Show the room in this scene as well")
         for scene in bpy.data.scenes
@@ -52,7 +52,7 @@ class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
     bl_label = "Link into Scene"
     remarks = "INFO"
 
-    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=others)
+    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=scene_items)
     outside: bpy.props.BoolProperty(
         name="With Its Outside", description="Give that scene the room's world and exposure, too"
     )
@@ -79,25 +79,25 @@ class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
     clear: bpy.props.BoolProperty(name="Take Out", description="They are no assets any more", options={"SKIP_SAVE"})
 
     def work(self, context):
-        things = look.recovered(context.scene)
+        objects = look.recovered(context.scene)
         if self.selected_only:
-            things = [thing for thing in things if thing.select_get()]
-        count = assets.clear(things) if self.clear else assets.mark(things, not bpy.app.background)
+            objects = [obj for obj in objects if obj.select_get()]
+        count = assets.clear(objects) if self.clear else assets.mark(objects, not bpy.app.background)
         if not count:
             raise NothingDone(
                 "None of these materials is an asset." if self.clear else "No recovered object is selected."
             )
-        done = "no assets any more" if self.clear else "in the Asset Browser, Current File"
-        return [f"{count} material{'s' * (count > 1)} {done}."]
+        message = "no assets any more" if self.clear else "in the Asset Browser, Current File"
+        return [f"{count} material{'s' * (count > 1)} {message}."]
 
 
-def _wearing(context) -> bool:
-    from ...addon.bridge.own_scene.write_back import wearing
+def _has_restorable(context) -> bool:
+    from ...addon.bridge.own_scene.write_back import restorable
 
-    return bool(wearing(context.scene.objects))
+    return bool(restorable(context.scene.objects))
 
 
-@needs(_wearing, "No object of this scene wears a recovered material over its own.")
+@needs(_has_restorable, "No object of this scene wears a recovered material over its own.")
 @object_mode
 @has_scene
 class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):

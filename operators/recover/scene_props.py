@@ -1,4 +1,4 @@
-"""What the artist chose, kept in the scene: plain choices only. What a run does at the moment is nobody's to save."""
+"""The artist's choices, stored in the scene: plain values only. The state of a run is not saved."""
 
 from contextlib import suppress
 
@@ -12,39 +12,39 @@ from . import findings
 from .reading_props import ReadingProps
 from .settings_props import COPIES, IMAGES, SettingsProps, preset_property
 
-HOW = ("threads", "seed")
-"""Settings that say how and not what is computed: no preset's."""
+NOT_IN_PRESETS = ("threads", "seed")
+"""Settings that do not change what is computed, and so belong to no preset."""
 
 
 def preset_chosen(choices, context) -> None:
-    """Lay the preset's values into the settings."""
+    """Copy the preset's values into the settings."""
     for info in setting_infos():
-        if info.name not in HOW:
+        if info.name not in NOT_IN_PRESETS:
             setattr(choices.settings, info.name, getattr(PRESETS[choices.preset], info.name))
 
 
 def capture_chosen(choices, context) -> None:
-    """Have a look at the folder at once, beside the window."""
+    """Read the folder at once, beside the window."""
     if choices.capture_folder and not bpy.app.background and findings.wrong_folder(choices) is None:
-        with suppress(StorageError):  # then the button says why
+        with suppress(StorageError):  # then the button reports the error
             findings.begin(choices)
 
 
 class ScanRelightSettings(SettingsProps, bpy.types.PropertyGroup):
-    """The settings as they are chosen."""
+    """The chosen settings."""
 
     def changed(self, preset: str) -> list[str]:
         """Names of the settings that differ from the preset's."""
 
         def differs(info) -> bool:
-            own, wanted = getattr(self, info.name), getattr(PRESETS[preset], info.name)
-            return abs(own - wanted) > 1e-5 if info.kind is float else own != wanted
+            value, preset_value = getattr(self, info.name), getattr(PRESETS[preset], info.name)
+            return abs(value - preset_value) > 1e-5 if info.kind is float else value != preset_value
 
-        return [info.name for info in setting_infos() if info.name not in HOW and differs(info)]
+        return [info.name for info in setting_infos() if info.name not in NOT_IN_PRESETS and differs(info)]
 
 
 class ScanRelightReading(ReadingProps, bpy.types.PropertyGroup):
-    """How the capture is to be read."""
+    """How the capture is read."""
 
 
 class ScanRelightScene(bpy.types.PropertyGroup):

@@ -1,4 +1,4 @@
-"""The settings as properties of an operator, made from the `Settings` dataclass; and what all operators share."""
+"""The settings as properties of an operator, made from the `Settings` dataclass; base classes of operators."""
 
 import contextlib
 import importlib.util
@@ -70,7 +70,7 @@ FROM_STAGE = bpy.props.EnumProperty(
     ],
 )
 SAVED_AS = {"median": (2, 3, 4)}
-"""Numbers by which saved files know choices, where some have gone: 0 was 'adaptive', 1 'batched'."""
+"""Numbers of choices in saved files, where some were removed: 0 was 'adaptive', 1 'batched'."""
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -95,8 +95,8 @@ class SettingsProps:
 
 
 def setting_value(owner, info: SettingInfo):
-    """What `owner` has chosen; of a choice that has gone, the default. Blender keeps floats in single precision; six
-    digits are what was typed."""
+    """The value in `owner`; for a removed choice the default. Blender stores floats in single precision, so six digits
+    are as typed."""
     value = getattr(owner, info.name)
     if info.choices:
         return value or info.default
@@ -105,12 +105,12 @@ def setting_value(owner, info: SettingInfo):
 
 @cache
 def missing_packages() -> tuple[str, ...]:
-    """The bundled packages that are not there."""
+    """The bundled packages that are missing."""
     return tuple(name for name in PACKAGES if importlib.util.find_spec(name) is None)
 
 
 def startable(operator):
-    """Class decorator: what everything asks in `poll` that reads a capture, or starts another operator that does."""
+    """Class decorator: `poll` of operators that read a capture, or start another one that does."""
     packages = needs(
         lambda context: not missing_packages(),
         lambda: f"{' and '.join(missing_packages())} missing: install the extension again.",
@@ -118,16 +118,16 @@ def startable(operator):
     return free_scene(packages(operator))
 
 
-def preset_property(description: str, **more):
-    """A property that holds the name of a preset."""
+def preset_property(description: str, **kwargs):
+    """A property for the name of a preset."""
     items = [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
-    told = {"name": "Preset", "description": description, "default": "normal", "translation_context": OWN}
-    return bpy.props.EnumProperty(items=items, **told, **more)
+    keywords = {"name": "Preset", "description": description, "default": "normal", "translation_context": OWN}
+    return bpy.props.EnumProperty(items=items, **keywords, **kwargs)
 
 
 @startable
 class CaptureOperator(ReadingProps, OneSentence, JobOperator):
-    """Works on a capture: a job of its own that `modal` follows; in the background `execute` does it itself."""
+    """Works on a capture: in a job that `modal` follows; in the background `execute` does it itself."""
 
     bl_options = {"UNDO", "PRESET"}
     capture_folder: folder_property("Capture", "Folder with transforms.json, mesh.ply and the frames", "SKIP_PRESET")
@@ -176,43 +176,43 @@ class StageOperator(SettingsProps, CaptureOperator):
         return self.run(context, self.until)["warnings"]
 
     def draw(self, context):
-        """The dialog: what is to be decided; all else comes from the preset or from who calls."""
+        """The dialog with the main choices; all others come from the preset or the caller."""
         fields(self.layout, self, "capture_folder", "result_folder", "preset", "from_stage")
 
     def settings(self) -> Settings:
-        """The preset with every setting that was given; threads are the preferences' where they are not."""
-        given = {
+        """The preset with every setting that is set; threads from the preferences where they are not."""
+        values = {
             info.name: setting_value(self, info)
             for info in setting_infos()
             if self.properties.is_property_set(info.name)
         }
-        ours = preferences.preferences()
-        if not given.get("threads") and ours is not None:
-            given["threads"] = ours.threads
-        return replace(PRESETS[self.preset], **given)
+        addon_preferences = preferences.preferences()
+        if not values.get("threads") and addon_preferences is not None:
+            values["threads"] = addon_preferences.threads
+        return replace(PRESETS[self.preset], **values)
 
-    def run(self, context, until: str, **how) -> dict:
-        """Run the stages up to `until` here; returns the report. `how` goes to `bridge.job.run.run`."""
+    def run(self, context, until: str, **options) -> dict:
+        """Run the stages up to `until` here; returns the report. `options` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
         from ...addon.core.pipeline.run import Asked, progress_of_run  # not earlier: Blender's start should not wait
 
-        settings, asked = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
+        settings, request = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
         folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
-            return run(*folders, settings, progress_of_run(should_stop=guard), asked, **how)
+            return run(*folders, settings, progress_of_run(should_stop=guard), request, **options)
 
     def first_stage(self) -> str | None:
-        """The stage that is done anew with all later ones; None goes on from what is stored."""
+        """The stage that is computed again with all later ones; None continues from the stored ones."""
         return None if self.from_stage == "NONE" else self.from_stage
 
     @staticmethod
     def memory_limit() -> float | None:
-        """Gigabytes that a run may take; None for most of what is free."""
-        ours = preferences.preferences()
-        return (ours.memory_limit or None) if ours is not None else None
+        """Gigabytes that a run may use; None for most of the free memory."""
+        addon_preferences = preferences.preferences()
+        return (addon_preferences.memory_limit or None) if addon_preferences is not None else None
 
     def begin(self, context):
-        """Start the run as a job; the command line's own, so that its result is the same."""
+        """Start the run as a job of the command line, so that its result is the same."""
         capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
         words = command(
             ["recover", capture, *reading_props.options(self)],
@@ -239,7 +239,7 @@ class SceneStageOperator(StageOperator):
     into: INTO
 
     def work(self, context):
-        """Run, then bring the room, so that a failed run leaves the file alone."""
+        """Run, then bring in the room, so that a failed run does not change the file."""
         from ...addon.core.results.room_file import read_room
         from ...addon.core.results.store import Store
 
@@ -255,7 +255,7 @@ class SceneStageOperator(StageOperator):
         return super().begin(context)
 
     def check_target(self) -> None:
-        """Raise where the capture should be in the file and is not: now, not after the work."""
+        """Raise where the capture should be in the file and is not: before the work, not after it."""
         from ...addon.bridge.own_scene.capture import check_own
         from ...addon.bridge.own_scene.write_back import is_own
         from ...addon.bridge.results import images as result_images
@@ -274,7 +274,7 @@ class SceneStageOperator(StageOperator):
         return read_room(job.facts["result_folder"])
 
     def change(self, scene, loaded):
-        """Bring the room, or put the materials onto the artist's own objects."""
+        """Bring in the room, or assign the materials to the artist's own objects."""
         from ...addon.bridge.own_scene.write_back import is_own, writing_back
         from ...addon.bridge.room.bring import bringing
 

@@ -1,4 +1,4 @@
-"""What the interface calls the settings and their choices; what each does is the `Settings` docstring's to say."""
+"""Labels of the settings and their choices in the interface; the docstring of `Settings` describes what each does."""
 
 from ...addon.settings_info import SettingInfo
 
@@ -20,7 +20,7 @@ LABELS = {
     "refine": "Rounds After",
     "texture_fill": "Texture the Unseen",
 }
-"""Of those that the name itself, as a title, does not say well."""
+"""Of settings whose name makes no good label."""
 CHOICES = {
     "atlas": {
         "room": ("One for the Room", "One image for all objects"),

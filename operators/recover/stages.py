@@ -41,7 +41,7 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
         return (*capture.warnings, *whole(self.change(context.scene, capture)))
 
     def begin(self, context):
-        """Read it beside the window; large captures take a while."""
+        """Read it beside the window, as large captures take a while."""
         capture, scratch = self.folder("capture_folder"), tempfile.mkdtemp(prefix="scan-relight-")
         options = {"json": True, "room": scratch, "stop_with_stdin": True}
         words = command(["info", capture, *reading_props.options(self)], **options)
@@ -74,7 +74,7 @@ class SCAN_RELIGHT_OT_check_capture(AtOnce, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def work(self, context):
-        """With a window beside it; in the background at once."""
+        """Beside the window; in the background at once."""
         choices = context.scene.scan_relight
         if not bpy.app.background:
             findings.begin(choices)
@@ -156,28 +156,28 @@ class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
         return self.attempt(lambda: self.start(context.scene))
 
     def start(self, scene) -> set[str]:
-        """Hand the choices over; what the artist gave of a room that is run again goes to where the run heeds it."""
+        """Pass the choices on; the artist's statements on a room that is run again are stored for the run."""
         operator = getattr(bpy.ops.scan_relight, self.target)
-        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+        execution_context = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
         chosen = self.chosen(scene.scan_relight)
         if self.target != "import_capture":
             capture = Path(bpy.path.abspath(chosen["capture_folder"])).absolute()
             keep_for_run(scene, Path(chosen["result_folder"]), capture)
-        verdict = operator(how, ask=False, **chosen)
-        return {"FINISHED"} if verdict & {"FINISHED", "RUNNING_MODAL"} else {"CANCELLED"}
+        status = operator(execution_context, ask=False, **chosen)
+        return {"FINISHED"} if status & {"FINISHED", "RUNNING_MODAL"} else {"CANCELLED"}
 
     def chosen(self, choices) -> dict:
-        """The target's properties."""
-        found = {"capture_folder": choices.capture_folder}
-        found |= {name: getattr(choices.reading, name) for name in reading_props.NAMES}
+        """Properties of the target operator."""
+        properties = {"capture_folder": choices.capture_folder}
+        properties |= {name: getattr(choices.reading, name) for name in reading_props.NAMES}
         if self.target == "import_capture":
-            return found
-        found["result_folder"] = str(preferences.chosen_result(choices.id_data))
-        found |= {"preset": choices.preset, "from_stage": self.from_stage}
-        found |= {name: getattr(choices, name) for name in ("images", "copies")}
-        wanted = {*choices.settings.changed(choices.preset), "threads", "seed"}
-        return found | {
-            info.name: setting_value(choices.settings, info) for info in setting_infos() if info.name in wanted
+            return properties
+        properties["result_folder"] = str(preferences.chosen_result(choices.id_data))
+        properties |= {"preset": choices.preset, "from_stage": self.from_stage}
+        properties |= {name: getattr(choices, name) for name in ("images", "copies")}
+        changed = {*choices.settings.changed(choices.preset), "threads", "seed"}
+        return properties | {
+            info.name: setting_value(choices.settings, info) for info in setting_infos() if info.name in changed
         }
 
 
@@ -185,7 +185,7 @@ FOLDER = "scene_capture"
 
 
 @needs(
-    lambda context: any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
+    lambda context: any(obj.type not in ("CAMERA", "LIGHT") for obj in context.selected_objects),
     "Select the objects of the room first.",
 )
 @startable
@@ -232,8 +232,8 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
 
     def draw(self, context):
         animated = self.cameras != "OBJECTS"
-        ends = ["frame_start", "frame_end"] * (not self.whole_range)
-        fields(self.layout, self, "cameras", *["whole_range", *ends, "frame_step"] * animated)
+        range_names = ["frame_start", "frame_end"] * (not self.whole_range)
+        fields(self.layout, self, "cameras", *["whole_range", *range_names, "frame_step"] * animated)
 
     def work(self, context):
         from ...addon.bridge.own_scene.capture import capture_scene
@@ -247,7 +247,7 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
         )
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
         home.check(str(folder))
-        told = capture_scene(context, folder, context.selected_objects, self.cameras, first, last, self.frame_step)
+        warnings = capture_scene(context, folder, context.selected_objects, self.cameras, first, last, self.frame_step)
         choices.capture_folder = str(folder)
         self.report({"INFO"}, f"Captured into {folder}")
-        return told
+        return warnings

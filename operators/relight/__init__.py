@@ -1,1 +1,1 @@
-"""New light, exposure, cameras, things set in, before and after, export."""
+"""New light, exposure, cameras, virtual objects, before and after, export."""

@@ -1,4 +1,4 @@
-"""What the operators for the light share: when they can run, and what follows a change of it."""
+"""Shared by the operators for the light: when they can run, and what follows a change of the light."""
 
 import time
 
@@ -28,54 +28,54 @@ class RelightOperator(SceneOperator):
 
 def has_room(scene: bpy.types.Scene) -> bool:
     """Whether any object of a scene was scanned."""
-    return any(OBJECT_ID in thing for thing in scene.objects)
+    return any(OBJECT_ID in obj for obj in scene.objects)
 
 
-_REST: Shown[float] = 0.2
+_SLIDER_REST: Shown[float] = 0.2
 _SLICE: Shown[float] = 0.02
-"""Seconds that a slider stays still to count as let go; that looking takes of the window's time at once."""
-_looked: dict = {"run": None}
+"""Seconds without a change after which a slider counts as released; seconds of one slice of measuring."""
+_measuring: dict = {"run": None}
 
 
 def follow(scene: bpy.types.Scene) -> None:
-    """After a change of the light: expose for it, by an estimate, where that was asked for."""
+    """After a change of the light: expose for it, by an estimate, if `follow` is on."""
     if scene.scan_relight_studio.follow and scene.camera is not None:
         exposure.follow(scene)
 
 
 def follow_soon() -> None:
-    """As `follow`, once the slider that is dragged has rested; at once without a window."""
+    """As `follow`, once the slider is released; at once without a window."""
     if bpy.app.background:
         follow(bpy.context.scene)
         return
-    if bpy.app.timers.is_registered(_rested):
-        bpy.app.timers.unregister(_rested)
-    bpy.app.timers.register(_rested, first_interval=_REST)
+    if bpy.app.timers.is_registered(_follow_current):
+        bpy.app.timers.unregister(_follow_current)
+    bpy.app.timers.register(_follow_current, first_interval=_SLIDER_REST)
 
 
-def _rested() -> None:
+def _follow_current() -> None:
     scene = bpy.context.scene
-    if hasattr(scene, "scan_relight_studio"):  # else the add-on is gone
+    if hasattr(scene, "scan_relight_studio"):  # else the add-on was disabled
         follow(scene)
 
 
-def look_soon(scene: bpy.types.Scene) -> None:
-    """Have a panel know before long how bright the light is; it can be asked for by what draws."""
-    if _looked["run"] is None and not bpy.app.background and not estimate.is_known(scene):
-        _looked["run"] = estimate.looking(scene)
-        bpy.app.timers.register(_look, first_interval=_SLICE)
+def measure_soon(scene: bpy.types.Scene) -> None:
+    """Start measuring how bright the light is, for a panel; can be called while drawing."""
+    if _measuring["run"] is None and not bpy.app.background and not estimate.is_known(scene):
+        _measuring["run"] = estimate.measure_in_steps(scene)
+        bpy.app.timers.register(_measure_slice, first_interval=_SLICE)
 
 
-def _look() -> float | None:
-    """A slice of looking; at its end the panels are drawn anew."""
-    until = time.perf_counter() + _SLICE
+def _measure_slice() -> float | None:
+    """One slice of measuring; at the end the panels are redrawn."""
+    deadline = time.perf_counter() + _SLICE
     try:
-        for _ in _looked["run"]:
-            if time.perf_counter() > until:
+        for _ in _measuring["run"]:
+            if time.perf_counter() > deadline:
                 return _SLICE
-    except (ReferenceError, KeyError, ScanRelightError):  # the room went meanwhile; the next drawing asks anew
+    except (ReferenceError, KeyError, ScanRelightError):  # the room was removed meanwhile; the next redraw starts again
         pass
-    _looked["run"] = None
+    _measuring["run"] = None
     for area in areas(bpy.context, "VIEW_3D"):
         area.tag_redraw()
     return None

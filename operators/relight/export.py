@@ -24,7 +24,7 @@ SCOPES = (
 )
 
 
-@needs(lambda context: any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export.")
+@needs(lambda context: any(obj.type == "MESH" for obj in context.scene.objects), "The scene has no mesh to export.")
 class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     """Write the room with plain materials that other programs understand; the scene stays as it is"""
 
@@ -52,13 +52,13 @@ class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         if path.suffix.lower() not in export.FORMATS:
             path = path.with_name(path.name + self.format)
-        told = export.export(context.scene, path, self.scope, self.lights, self.cameras)
+        warnings = export.export(context.scene, path, self.scope, self.lights, self.cameras)
         self.report({"INFO"}, f"Exported '{path}'.")
-        return told
+        return warnings
 
 
 class SCAN_RELIGHT_PT_export(SidebarPanel, bpy.types.Panel):
-    """Take the room elsewhere."""
+    """Export the room."""
 
     bl_label = "Export"
     manual = "relighting#export"
@@ -67,12 +67,12 @@ class SCAN_RELIGHT_PT_export(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        for ending, text, _ in FORMATS:
-            problem = export.can_export(ending)
+        for extension, text, _ in FORMATS:
+            problem = export.can_export(extension)
             row = layout.row()
             row.enabled = not problem
-            row.operator("scan_relight.export", text=text, icon="EXPORT").format = ending
-        for problem in dict.fromkeys(export.can_export(ending) for ending, _, _ in FORMATS):
+            row.operator("scan_relight.export", text=text, icon="EXPORT").format = extension
+        for problem in dict.fromkeys(export.can_export(extension) for extension, _, _ in FORMATS):
             if problem:
                 self.say(layout, problem, "INFO")
         self.say(layout, "Pictures become 8-bit sRGB, materials plain: what other programs understand.")

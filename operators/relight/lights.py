@@ -47,7 +47,7 @@ _pictures = None
 
 
 def picture(name: str) -> int:
-    """Blender's number of a preset's picture; 0, for none, where it has no window to show one in."""
+    """Icon id of a preset's picture; 0 without a window."""
     global _pictures
     if bpy.app.background:
         return 0
@@ -62,7 +62,7 @@ def picture(name: str) -> int:
 
 
 def forget_pictures() -> None:
-    """Let go of the pictures."""
+    """Free the pictures."""
     global _pictures
     if _pictures is not None:
         from bpy.utils import previews
@@ -151,7 +151,7 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
 
 
 def put_around(scene, picture: str) -> list[str]:
-    """Put a picture around the room, scaled to a day outside such a room; returns warnings."""
+    """Put a picture around the room, scaled to typical daylight for such a room; returns warnings."""
     outside.use_hdri(scene, picture, outside.usual_radiance(scene))
     return outside.remarks(scene)
 
@@ -229,7 +229,7 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
     _wait = True
 
     def invoke(self, context, event):
-        """From a button: the window stays alive meanwhile."""
+        """From a button: does not block the window."""
         self._wait = False
         return self.execute(context)
 
@@ -242,13 +242,15 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
 
 
 def _fit_when_baked(name: str) -> float | None:
-    """A timer: once Blender's own bake has ended, bring it to Cycles' brightness."""
-    baking = {one.bl_idname for window in bpy.context.window_manager.windows for one in window.modal_operators}
+    """A timer: once Blender's own bake has ended, fit its brightness to Cycles."""
+    baking = {
+        operator.bl_idname for window in bpy.context.window_manager.windows for operator in window.modal_operators
+    }
     if "OBJECT_OT_lightprobe_cache_bake" in baking:
         return 0.5
     scene = bpy.data.scenes.get(name)
     if scene is not None:
-        with suppress(ScanRelightError):  # then the light stays as it was baked
+        with suppress(ScanRelightError):  # then the light stays as baked
             probe.fit(scene)
     return None
 

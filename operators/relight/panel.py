@@ -9,18 +9,18 @@ from ...addon.bridge.relight import exposure, lights, match_frame
 from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
 from ..base.panel import NamedRows, SidebarPanel, fields, places
-from .base import has_room, look_soon
+from .base import has_room, measure_soon
 from .lights import PRESETS, picture
 
 NAME: Shown[float] = 0.6
-"""Share of a row of the lamps that their names have."""
+"""Share of the names in a row of the lamps."""
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
 
 class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
-    """The lamps by the first object that wears each: of materials Blender would first render pictures."""
+    """The lamps by the first object of each: for materials Blender would first render previews."""
 
-    lamps: dict = {}  # what the last `filter_items` found, as it comes before the rows
+    lamps: dict = {}  # result of the last `filter_items`, which runs before the rows are drawn
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
         column = layout.column(align=True)
@@ -40,15 +40,17 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
 
     def filter_items(self, context, data, name):
         """Of all objects, one for each lamp; sorted by the lamps' names."""
-        wanted = self.filter_name.casefold()
+        pattern = self.filter_name.casefold()
         lamps = type(self).lamps = relight_lamps.lamps_by_object(context.scene)
-        names = [" ".join(lamp.name for lamp in lamps.get(thing.name, ())) for thing in getattr(data, name)]
-        shown = [self.bitflag_filter_item if found and wanted in found.casefold() else 0 for found in names]
-        return shown, places([in_order(found) for found in names])
+        names = [" ".join(lamp.name for lamp in lamps.get(obj.name, ())) for obj in getattr(data, name)]
+        flags = [
+            self.bitflag_filter_item if lamp_names and pattern in lamp_names.casefold() else 0 for lamp_names in names
+        ]
+        return flags, places([in_order(lamp_names) for lamp_names in names])
 
 
 class RelightPanel(SidebarPanel):
-    """A part that needs a scanned room."""
+    """A panel that needs a scanned room."""
 
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
@@ -86,19 +88,19 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
         layout.operator("scan_relight.restore_light", icon="LOOP_BACK")
 
     def numbers(self, layout, context, lamp) -> None:
-        """What a lamp emits, now and as found."""
+        """What a lamp emits now, and as recovered."""
         column = fields(layout.column())
         column.prop(lamp.scan_relight_lamp, "factor")
         coloured = relight_lamps.colour(lamp) is not None
         fields(column.column(), lamp.scan_relight_lamp, "kelvin", "colour").enabled = coloured
-        now, found = (
+        present, recovered = (
             " ".join(f"{c:.3g}" for c in values)
             for values in (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp))
         )
-        self.say(layout, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
+        self.say(layout, f"{lamp.name}: radiance {present} (R G B, in the frames' unit)")
         if relight_lamps.is_changed(lamp):
             row = layout.row()
-            self.say(row.column(), f"Found: {found}")
+            self.say(row.column(), f"Found: {recovered}")
             row.operator("scan_relight.restore_lamp", text="", icon="LOOP_BACK").name = lamp.name
 
 
@@ -157,7 +159,7 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
 
 
 class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
-    """How bright it is shown, and by EEVEE."""
+    """Exposure, and the preview in EEVEE."""
 
     bl_label = "Exposure and Preview"
 
@@ -169,10 +171,10 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         column.prop(scene.view_settings, "exposure", text="Exposure (stops)")
         column.operator("scan_relight.expose", icon="LIGHT_SUN")
         column.prop(scene.scan_relight_studio, "follow", toggle=True)
-        look_soon(scene)
-        said = exposure.darkness(scene)
-        if said:
-            self.say(layout, said, "INFO")
+        measure_soon(scene)
+        sentence = exposure.darkness(scene)
+        if sentence:
+            self.say(layout, sentence, "INFO")
         if exposure.CAPTURED in scene:
             layout.operator("scan_relight.restore_exposure", icon="LOOP_BACK")
         row = layout.row(align=True)
@@ -206,7 +208,7 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
 
 
 class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
-    """Things that were not scanned."""
+    """Objects that were not scanned."""
 
     bl_label = "Objects"
     bl_options = {"DEFAULT_CLOSED"}

@@ -1,6 +1,6 @@
-"""What the panels Relight and Export show: lamps and outside as they are, and what was chosen for the next click.
+"""Properties of the panels Relight and Export: lamps and outside, and choices for the next operator.
 
-The properties of lamps and outside hold nothing: they read and write what the bridge keeps with material and world.
+The properties of lamps and outside store nothing: they read and write what the bridge stores with material and world.
 """
 
 import math
@@ -37,7 +37,7 @@ _FACTOR = {"min": 0.0, "soft_max": 4.0, "step": 5, "precision": 2}
 _TEMPERATURE = {"subtype": "TEMPERATURE", "max": HIGHEST, "step": 10000, "precision": 0}
 _LUMENS = {"min": 0.0, "soft_max": 100000.0, "step": 1000, "precision": 0}
 
-# Shared by the panel's choices and the operators that they go to.
+# Shared by the panel's choices and the operators that take them.
 SHAPE = bpy.props.EnumProperty(
     name="Shape",
     description="What is set into the room",
@@ -81,7 +81,7 @@ PERCENTAGE = bpy.props.IntProperty(
 
 
 def _kept(read, change) -> dict:
-    """Getter and setter of a property that the bridge keeps with its owner; the exposure follows a change."""
+    """Getter and setter of a property that the bridge stores with its owner; the exposure follows a change."""
 
     def set_value(group, value):
         change(group.id_data, value)
@@ -90,10 +90,10 @@ def _kept(read, change) -> dict:
     return {"get": lambda group: read(group.id_data), "set": set_value}
 
 
-def _of_lamp(read, change, otherwise) -> dict:
-    """The same of a material, as long as it is a lamp's."""
+def _of_lamp(read, change, default) -> dict:
+    """The same for a material, as long as it is a lamp's."""
     return _kept(
-        lambda material: read(material) if lamps.is_lamp(material) else otherwise,
+        lambda material: read(material) if lamps.is_lamp(material) else default,
         lambda material, value: change(material, value) if lamps.is_lamp(material) else None,
     )
 
@@ -167,7 +167,7 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
 
 
 def look_through(studio, index: int, size: bool = False) -> str:
-    """Make the scene's camera that of a frame, its picture shown as chosen; returns what `match_frame` says."""
+    """Make the scene's camera that of a frame, its picture shown as chosen; returns the sentence of `match_frame`."""
     return match_frame.match_frame(
         studio.id_data,
         index,

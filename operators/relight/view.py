@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` for what is seen: a frame's camera, things that are set into the room, before and after."""
+"""`bpy.ops.scan_relight.*` for the view: a frame's camera, virtual objects in the room, before and after."""
 
 import shutil
 import tempfile
@@ -16,7 +16,7 @@ from ...addon.bridge.relight import virtual_object as virtual
 from ...addon.bridge.render_device import current_device
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator, areas
-from ..base.operator import TURNING, file_property, mouse_ray, needs, no_run
+from ..base.operator import NAVIGATION_EVENTS, file_property, mouse_ray, needs, no_run
 from ..results.look import make_active
 from ..translations import OWN
 from .base import RelightOperator, SceneOperator
@@ -41,9 +41,9 @@ class SCAN_RELIGHT_OT_match_frame(SceneOperator, bpy.types.Operator):
         index = (match_frame.current(scene) + self.step) % count if self.step else self.index
         if index >= count:
             raise BadInputError(f"There is no frame {index}; the capture's last one is {count - 1}.")
-        told = look_through(scene.scan_relight_studio, index, self.size)
+        message = look_through(scene.scan_relight_studio, index, self.size)
         see_through_camera(context)
-        return [told] if told else []
+        return [message] if message else []
 
 
 @needs(
@@ -62,14 +62,14 @@ class SCAN_RELIGHT_OT_follow_track(SceneOperator, bpy.types.Operator):
 
 
 def see_through_camera(context) -> None:
-    """Have the 3D view that a button was pressed in look through the scene's camera."""
+    """Switch the 3D view of the context to the scene's camera."""
     space = context.space_data
     if space is not None and space.type == "VIEW_3D" and space.region_3d is not None:
         space.region_3d.view_perspective = "CAMERA"
 
 
 def surface(scene, place: str, ignored=None):
-    """The surface that a choice of `PLACES` means."""
+    """The surface for a choice of `PLACES`."""
     return virtual.below_cursor(scene) if place == "CURSOR" else virtual.place_in_view(scene, ignored)
 
 
@@ -84,8 +84,8 @@ class SCAN_RELIGHT_OT_add_virtual(RelightOperator, bpy.types.Operator):
     place: PLACE
 
     def work(self, context):
-        thing = virtual.add_virtual(context.scene, self.shape, self.size, self.look, surface(context.scene, self.place))
-        make_active(context, thing)
+        obj = virtual.add_virtual(context.scene, self.shape, self.size, self.look, surface(context.scene, self.place))
+        make_active(context, obj)
 
 
 @needs(
@@ -128,7 +128,7 @@ class SCAN_RELIGHT_OT_pick_place(OwnObject, bpy.types.Operator):
         if not areas(context, "VIEW_3D"):
             self.report({"ERROR"}, "There is no 3D view to pick in.")
             return {"CANCELLED"}
-        self._thing, self._before = context.object.name, context.object.matrix_world.copy()
+        self._object_name, self._matrix_before = context.object.name, context.object.matrix_world.copy()
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set("Click: set down here   ESC or right click: back to where it was")
         return {"RUNNING_MODAL"}
@@ -138,34 +138,34 @@ class SCAN_RELIGHT_OT_pick_place(OwnObject, bpy.types.Operator):
         virtual.stand(context.scene, context.object)
 
     def modal(self, context, event):
-        thing = context.scene.objects.get(self._thing)
-        if thing is None or event.type in {"ESC", "RIGHTMOUSE"}:
-            if thing is not None:
-                thing.matrix_world = self._before
+        obj = context.scene.objects.get(self._object_name)
+        if obj is None or event.type in {"ESC", "RIGHTMOUSE"}:
+            if obj is not None:
+                obj.matrix_world = self._matrix_before
             return self._leave(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             return self._leave(context, {"FINISHED"})
         if event.type == "MOUSEMOVE":
-            self._move(context, thing, event)
+            self._move(context, obj, event)
             return {"RUNNING_MODAL"}
-        return {"PASS_THROUGH"} if event.type in TURNING else {"RUNNING_MODAL"}
+        return {"PASS_THROUGH"} if event.type in NAVIGATION_EVENTS else {"RUNNING_MODAL"}
 
-    def _move(self, context, thing, event):
+    def _move(self, context, obj, event):
         ray = mouse_ray(context, event)
         if ray is None:
             return
-        thing.hide_viewport = True
+        obj.hide_viewport = True
         try:
             hit = cast(context.scene, *ray)
         finally:
-            thing.hide_viewport = False
+            obj.hide_viewport = False
         if hit is not None:
-            with suppress(ScanRelightError):  # nothing to stand on there: it stays where it was last
-                virtual.stand(context.scene, thing, hit)
+            with suppress(ScanRelightError):  # no surface to stand on: it stays where it was last
+                virtual.stand(context.scene, obj, hit)
 
-    def _leave(self, context, verdict):
+    def _leave(self, context, status):
         context.workspace.status_text_set(None)
-        return verdict
+        return status
 
 
 FILE = "before_after.png"
@@ -204,7 +204,7 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         before_after.show(out)
 
     def execute(self, context):
-        """Blocks in the background; else starts the job."""
+        """Blocks in the background; otherwise starts the job."""
         if bpy.app.background:
             return RelightOperator.execute(self, context)
         return self.attempt(lambda: self.begin(context))

@@ -1,1 +1,1 @@
-"""What was found: the panels Results and Look, result folders that are moved, opened and cleared."""
+"""Results: the panels Results and Look, result folders that are moved, opened and cleared."""

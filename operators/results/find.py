@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.*` for result folders: found again after a move, freed of their stages, opened as a page."""
+"""`bpy.ops.scan_relight.*` for result folders: found after a move, cleared of their stages, their report opened."""
 
 from pathlib import Path
 
@@ -9,10 +9,10 @@ from ...addon.core.errors import BadInputError
 from .. import preferences
 from ..base.operator import FOLDERS, AtOnce, Choosing, folder_property, needs, no_run
 from ..base.panel import SidebarPanel
-from . import told
+from . import summary
 
-_found: list[str] = []
-"""What was found again when the open file was loaded."""
+_messages: list[str] = []
+"""Messages on results that were found when the open file was loaded."""
 
 
 class SCAN_RELIGHT_OT_find_result(Choosing, AtOnce, bpy.types.Operator):
@@ -27,31 +27,31 @@ class SCAN_RELIGHT_OT_find_result(Choosing, AtOnce, bpy.types.Operator):
     filter_folder: FOLDERS
 
     def work(self, context):
-        one = self.wanted()
+        lost = self.wanted()
         if not self.directory:
             raise BadInputError("Choose the folder that the result lies in now.")
-        new = find.find(one, Path(bpy.path.abspath(self.directory)).absolute())
-        count = find.repoint(one.folder, new)
+        new = find.find(lost, Path(bpy.path.abspath(self.directory)).absolute())
+        count = find.repoint(lost.folder, new)
         for scene in bpy.data.scenes:
             choices = scene.scan_relight
-            if choices.result_folder and Path(bpy.path.abspath(choices.result_folder)) == one.folder:
+            if choices.result_folder and Path(bpy.path.abspath(choices.result_folder)) == lost.folder:
                 choices.result_folder = str(new)
-        left = next((other for other in find.missing() if other.folder == new), None)
+        remaining = next((other for other in find.missing() if other.folder == new), None)
         self.report({"INFO"}, f"{count} picture{'s' * (count != 1)} found in '{new}'.")
-        return [left.sentence] if left is not None else []
+        return [remaining.sentence] if remaining is not None else []
 
     def wanted(self) -> find.Missing:
         lost = find.missing()
         if self.missing:
             folder = Path(bpy.path.abspath(self.missing)).absolute()
-            lost = [one for one in lost if one.folder == folder]
+            lost = [item for item in lost if item.folder == folder]
         if not lost:
             raise BadInputError("Nothing of a result is missing in this file.")
         return lost[0]
 
 
 class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
-    """What the file misses, above all else."""
+    """Missing results of the file, at the top of the tab."""
 
     bl_label = "Missing"
     bl_options = {"HIDE_HEADER"}
@@ -59,14 +59,14 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and bool(_found or any(find.known()))
+        return context.scene is not None and bool(_messages or any(find.cached_state()))
 
     def draw(self, context):
         layout = self.layout
-        missing, overtaken = find.known()
-        for one in missing:
-            self.say(layout, one.sentence, "ERROR")
-            layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
+        missing, overtaken = find.cached_state()
+        for lost in missing:
+            self.say(layout, lost.sentence, "ERROR")
+            layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(lost.folder)
         for folder in overtaken:
             self.say(
                 layout,
@@ -75,37 +75,41 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
                 "ERROR",
             )
             layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
-        for sentence in _found:
+        for sentence in _messages:
             self.say(layout, sentence, "INFO")
 
 
 @bpy.app.handlers.persistent
 def look_for_results(*_) -> None:
-    """A file was opened: find what was moved along with it."""
-    _found[:] = find.search(preferences.results_folder())
+    """A file was loaded: find results that were moved with it."""
+    _messages[:] = find.search(preferences.results_folder())
 
 
 @bpy.app.handlers.persistent
-def keep_images(*told) -> None:
-    """The file is about to be saved: what it refers to of results is kept from later runs."""
-    path = next((one for one in told if isinstance(one, str) and one), bpy.data.filepath)
+def keep_images(*arguments) -> None:
+    """The file is about to be saved: protect the images that it uses from later runs."""
+    path = next((argument for argument in arguments if isinstance(argument, str) and argument), bpy.data.filepath)
     if path:
         images.keep(Path(path))
 
 
 @bpy.app.handlers.persistent
-def found_is_kept(*_) -> None:
-    """The file was saved: what was found again is in it now."""
-    _found.clear()
+def clear_messages(*_) -> None:
+    """The file was saved, with the new paths: the messages are obsolete."""
+    _messages.clear()
 
 
 def folders(scene: bpy.types.Scene | None) -> list[Path]:
     """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
-    from ...addon.core.results.cache import results as below
+    from ...addon.core.results.cache import results as results_below
 
-    beside = home.beside()
-    own = told.folder_of(scene) if scene is not None else None
-    return [*below(preferences.results_folder()), *(below(beside) if beside else ()), *([own] if own else ())]
+    folder_beside = home.folder_beside_file()
+    own_folder = summary.folder_of(scene) if scene is not None else None
+    return [
+        *results_below(preferences.results_folder()),
+        *(results_below(folder_beside) if folder_beside else ()),
+        *([own_folder] if own_folder else ()),
+    ]
 
 
 @no_run
@@ -140,8 +144,8 @@ class SCAN_RELIGHT_OT_clear_cache(AtOnce, bpy.types.Operator):
 
 
 def _page(context) -> Path | None:
-    folder = told.folder_of(context.scene) if context.scene else None
-    return folder / told.PAGE if folder is not None and (folder / told.PAGE).is_file() else None
+    folder = summary.folder_of(context.scene) if context.scene else None
+    return folder / summary.PAGE if folder is not None and (folder / summary.PAGE).is_file() else None
 
 
 @needs(_page, "There is no report yet; run the recovery to its end first.")
@@ -151,7 +155,7 @@ class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
     bl_label = "Open Report"
 
     def execute(self, context):
-        """Open it; in the background only say where it lies."""
+        """Open it; in the background only report its path."""
         page = _page(context)
         if bpy.app.background:
             self.report({"INFO"}, str(page))

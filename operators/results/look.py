@@ -9,22 +9,22 @@ from ..base.operator import AtOnce, has_scene, needs, object_mode
 from ..base.panel import SidebarPanel
 
 
-def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
+def make_active(context, obj: bpy.types.Object, extend: bool = False) -> None:
     """Select an object, with `extend` beside what is selected, and make it the active one."""
     if not extend:
         for other in context.view_layer.objects.selected:
             other.select_set(False)
-    thing.select_set(True)
-    context.view_layer.objects.active = thing
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
 
 
-def select(context, thing: bpy.types.Object, extend: bool = False) -> None:
+def select(context, obj: bpy.types.Object, extend: bool = False) -> None:
     """Select an object and make it the active one; raises `BadInputError` where it can't be."""
-    if thing.name not in context.view_layer.objects:
-        raise BadInputError(f"Object '{thing.name}' is not in this view layer; include its collection first.")
-    if not thing.visible_get():
-        raise BadInputError(f"Object '{thing.name}' is hidden; show it first.")
-    make_active(context, thing, extend)
+    if obj.name not in context.view_layer.objects:
+        raise BadInputError(f"Object '{obj.name}' is not in this view layer; include its collection first.")
+    if not obj.visible_get():
+        raise BadInputError(f"Object '{obj.name}' is hidden; show it first.")
+    make_active(context, obj, extend)
 
 
 @object_mode
@@ -38,14 +38,14 @@ class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
     extend: bpy.props.BoolProperty(name="Extend", description="Keep what is selected", options={"SKIP_SAVE"})
 
     def work(self, context):
-        meshes = (thing for thing in context.scene.objects if thing.type == "MESH")
-        found = [thing for thing in meshes if thing.get(OBJECT_ID) == self.object_id]
-        if not found:
+        meshes = (obj for obj in context.scene.objects if obj.type == "MESH")
+        matches = [obj for obj in meshes if obj.get(OBJECT_ID) == self.object_id]
+        if not matches:
             raise BadInputError(f"Object {self.object_id} is not in this scene; import the capture first.")
-        select(context, found[-1], self.extend)  # of several imports the last one's
+        select(context, matches[-1], self.extend)  # from the last of several imports
 
 
-LOOKS = [(name, one.label, one.text) for name, one in look.LOOKS.items()]
+LOOKS = [(name, entry.label, entry.text) for name, entry in look.LOOKS.items()]
 needs_recovered = needs(
     lambda context: context.scene is not None and look.recovered(context.scene),
     "No object of this scene wears recovered materials; run the recovery first.",
@@ -91,15 +91,15 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
         if not look.recovered(scene):
             self.say(layout, "Shows albedo, light and coverage in the viewport, once materials are recovered.", "INFO")
             return
-        shown = look.current(scene)
+        current_look = look.current(scene)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, one in look.LOOKS.items():
-            grid.operator("scan_relight.look", text=one.label, depress=name == shown).look = name
-        if shown == look.MATERIAL:
+        for name, entry in look.LOOKS.items():
+            grid.operator("scan_relight.look", text=entry.label, depress=name == current_look).look = name
+        if current_look == look.MATERIAL:
             return
-        self.say(layout, f"{look.LOOKS[shown].text}.")
+        self.say(layout, f"{look.LOOKS[current_look].text}.")
         self.say(layout, "Renders show the materials all the same.", "RESTRICT_RENDER_OFF")
-        if scene.view_settings.view_transform not in ("Standard", "Raw") and not look.LOOKS[shown].light:
+        if scene.view_settings.view_transform not in ("Standard", "Raw") and not look.LOOKS[current_look].light:
             self.say(layout, "Colours are exact under the view transform Standard (Render, Color Management).", "INFO")
         space = context.space_data
         if space is not None and space.type == "VIEW_3D" and space.shading.type in ("SOLID", "WIREFRAME"):

@@ -43,7 +43,7 @@ bpy.context.view_layer.objects.active = None
     chosen = window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')", patience=30)
     assert window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [chosen]
     known = window.ask(
-        "[module('operators.results.told').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
+        "[module('operators.results.summary').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
         f"['object_id']]['model'] for name in {[chosen]!r}]"
     )
     assert set(known) <= {"lambertian", "specular", "metal", "emitter", "transparent"}

@@ -98,7 +98,7 @@ def bringing(
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             mark(collection, folder, run)
-            changes.keep(collection, changes.found(folder))
+            changes.store_findings(collection, changes.read_findings(folder))
     return (*warnings, *sentences((edited, "the material was edited by hand and stays")))
 
 

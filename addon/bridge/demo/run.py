@@ -17,7 +17,7 @@ from ...core.settings import Settings
 from ..job.run import run
 from ..light import outside
 from ..light.lamps import find_lamps, set_on
-from ..relight.pictures import beside, can_denoise, shoot
+from ..relight.pictures import can_denoise, render_to_file, save_side_by_side
 from .compare import comparison
 from .render import is_rendered, render_capture
 from .room import look_at
@@ -85,7 +85,7 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     camera.matrix_world = Matrix(VIEW.tolist())
     scene.collection.objects.link(camera)
     scene.camera = camera
-    shoot(scene, out / "before.png")
+    render_to_file(scene, out / "before.png")
     progress.update(0.5)
     for lamp in find_lamps(scene):
         set_on(lamp, False)
@@ -96,5 +96,5 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
         obj = bpy.data.objects.new("Demo light", light)
         obj.matrix_world = Matrix(look_at(location, target).tolist())
         scene.collection.objects.link(obj)
-    shoot(scene, out / "relit.png")
-    beside(out / "before.png", out / "relit.png", out / "before_after.png")
+    render_to_file(scene, out / "relit.png")
+    save_side_by_side(out / "before.png", out / "relit.png", out / "before_after.png")

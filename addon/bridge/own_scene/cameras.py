@@ -1,7 +1,7 @@
 """The open scene's cameras as the frames of a capture: the inverse of `cameras.py`, exact to a thousandth of a pixel.
 
-Blender keeps a lens as millimetres over a sensor, and which side of the picture the sensor spans depends on the
-picture; a capture keeps pixels. Backgrounds tell which picture a camera took.
+Blender stores a focal length in millimetres and a sensor size, and which side of the picture the sensor spans depends
+on the picture's shape; a capture stores pixels. The background image of a camera is the picture that it took.
 """
 
 import re
@@ -18,27 +18,27 @@ from ...core.scene.model import Camera
 from ..data.cameras import kept_lens
 
 PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
-"""Custom properties of a camera and what they say of its frame; `make_cameras` leaves the first."""
+"""Custom properties of a camera and the fields of its frame that they set; `make_cameras` writes the first."""
 AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
 _DIGITS = re.compile(r"(\d+)(?!.*\d)")
 
 
 @dataclass(frozen=True)
 class View:
-    """A camera at one moment, and the picture that it took.
+    """A camera at one frame of the animation, and the picture that it took.
 
     Attributes
     ----------
     camera : Camera
         In the pixels of the picture; its pose in Blender's units.
-    told : dict of str to float
-        `exposure` and `saturation`, where the camera's `PROPERTIES` say them; see `core.scene.model.Frame`.
+    properties : dict of str to float
+        `exposure` and `saturation`, where the camera has the custom `PROPERTIES`; see `core.scene.model.Frame`.
     """
 
     name: str
     camera: Camera
     path: Path
-    told: dict[str, float]
+    properties: dict[str, float]
 
 
 def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float = 1.0) -> tuple[float, ...]:
@@ -67,26 +67,26 @@ def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: floa
     return fx, fx / aspect, width / 2 - data.shift_x * span, height / 2 + data.shift_y * span / aspect
 
 
-def frame_size(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, float, float]:
-    """Width, height and pixel aspect of what a camera shows: its own where `make_cameras` left them, or the scene's."""
-    if all(key in thing for key in ("width", "height", "pixel_aspect")):
-        return float(thing["width"]), float(thing["height"]), float(thing["pixel_aspect"])
+def frame_size(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[float, float, float]:
+    """Width, height and pixel aspect of a camera's frame: its own where `make_cameras` stored them, or the scene's."""
+    if all(key in obj for key in ("width", "height", "pixel_aspect")):
+        return float(obj["width"]), float(obj["height"]), float(obj["pixel_aspect"])
     render = scene.render
     return (float(render.resolution_x), float(render.resolution_y), render.pixel_aspect_y / render.pixel_aspect_x)
 
 
 def camera_of(
-    thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float, float, float], method: str = "STRETCH"
+    obj: bpy.types.Object, size: tuple[int, int], dimensions: tuple[float, float, float], method: str = "STRETCH"
 ) -> Camera:
-    """What took a picture of `size` that a camera has as its background.
+    """The capture's camera for a picture of `size` that a camera of Blender's has as its background.
 
     Parameters
     ----------
-    thing : bpy.types.Object
+    obj : bpy.types.Object
         A camera, evaluated where it is animated.
     size : tuple of int
         Width and height of the picture.
-    shown : tuple of float
+    dimensions : tuple of float
         See `frame_size`.
     method : str
         How the background fills the camera's frame: 'STRETCH', 'FIT' or 'CROP'.
@@ -94,56 +94,58 @@ def camera_of(
     Raises
     ------
     BadInputError
-        The camera is neither a perspective one nor one of `make_cameras`, or has no rigid place.
+        The camera is neither a perspective one nor one of `make_cameras`, or its pose is not rigid.
     """
-    data = thing.data
-    kept = kept_lens(thing)
-    if data.type != "PERSP" and (kept is None or data.type != "PANO"):
-        raise BadInputError(f"Camera '{thing.name}' is {data.type.lower()}; frames need perspective cameras.")
-    width, height, aspect = shown
+    data = obj.data
+    stored = kept_lens(obj)
+    if data.type != "PERSP" and (stored is None or data.type != "PANO"):
+        raise BadInputError(f"Camera '{obj.name}' is {data.type.lower()}; frames need perspective cameras.")
+    width, height, aspect = dimensions
     fx, fy, cx, cy = pixel_lens(data, width, height, aspect)
     lens = None
-    # A perspective that was changed since is no longer the one that the lens was kept for.
-    if kept is not None and (data.type == "PANO" or np.allclose(kept[1], (fx, fy, cx, cy), rtol=1e-3, atol=0.1)):
-        lens, (fx, fy, cx, cy) = kept
+    # A perspective that was changed since is not the one that the lens was stored for.
+    if stored is not None and (data.type == "PANO" or np.allclose(stored[1], (fx, fy, cx, cy), rtol=1e-3, atol=0.1)):
+        lens, (fx, fy, cx, cy) = stored
     # Pixels of the frame for each pixel of the picture, centre on centre.
-    across, down = width / size[0], height / size[1]
+    scale_x, scale_y = width / size[0], height / size[1]
     if method != "STRETCH":
-        across = down = (min if method == "FIT" else max)(across, down)
-    matrix = np.array(thing.matrix_world.normalized(), np.float64)
+        scale_x = scale_y = (min if method == "FIT" else max)(scale_x, scale_y)
+    matrix = np.array(obj.matrix_world.normalized(), np.float64)
     if not np.isfinite(matrix).all() or abs(abs(np.linalg.det(matrix[:3, :3])) - 1) > 1e-3:
-        raise BadInputError(f"Camera '{thing.name}' is sheared or has no size; apply its scale.")
+        raise BadInputError(f"Camera '{obj.name}' is sheared or has no size; apply its scale.")
     if np.linalg.det(matrix[:3, :3]) < 0:
-        raise BadInputError(f"Camera '{thing.name}' is mirrored; apply its scale.")
+        raise BadInputError(f"Camera '{obj.name}' is mirrored; apply its scale.")
     return Camera(
         *size,
-        fx / across,
-        fy / down,
-        size[0] / 2 + (cx - width / 2) / across,
-        size[1] / 2 + (cy - height / 2) / down,
+        fx / scale_x,
+        fy / scale_y,
+        size[0] / 2 + (cx - width / 2) / scale_x,
+        size[1] / 2 + (cy - height / 2) / scale_y,
         matrix,
         lens,
     )
 
 
 def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Object] = ()) -> list[bpy.types.Object]:
-    """The cameras of `among` (of the scene, where there is none) that have a picture behind them, by name."""
-    cameras = [thing for thing in among if thing.type == "CAMERA"] or scene.objects
-    found = (thing for thing in cameras if thing.type == "CAMERA" and background(thing.data))
-    return sorted(found, key=lambda thing: thing.name)
+    """The cameras of `among` (of the scene, where there is none) that have a background image, sorted by name."""
+    cameras = [obj for obj in among if obj.type == "CAMERA"] or scene.objects
+    with_background = (obj for obj in cameras if obj.type == "CAMERA" and background(obj.data))
+    return sorted(with_background, key=lambda obj: obj.name)
 
 
 def background(data: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
-    """The first background that holds a picture."""
-    return next((one for one in data.background_images if (one.image if one.source == "IMAGE" else one.clip)), None)
+    """The first background image that has a picture."""
+    return next(
+        (item for item in data.background_images if (item.image if item.source == "IMAGE" else item.clip)), None
+    )
 
 
 def views(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
-    things: list[bpy.types.Object],
+    cameras: list[bpy.types.Object],
     problems: list[str],
-    how: str = AUTO,
+    mode: str = AUTO,
     first: int | None = None,
     last: int | None = None,
     step: int = 1,
@@ -154,88 +156,90 @@ def views(
     ----------
     scene : bpy.types.Scene
         With `ANIMATION` its frame is changed; the caller sets it back.
-    things : list of bpy.types.Object
+    cameras : list of bpy.types.Object
         See `cameras_with_pictures`.
     problems : list of str
         Gets one sentence for each picture that can't be used.
-    how : str
+    mode : str
         `OBJECTS`: one frame for each camera. `ANIMATION`: one for each frame of the scene's animation, through the
-        active camera, or the only one. `AUTO`: an animation where the one camera has a sequence or a clip behind it.
+        active camera, or the only one. `AUTO`: an animation where the only camera has a sequence or a clip behind it.
     first, last, step : int, optional
         Frames of the animation; the scene's where left out.
     """
-    if how == AUTO:
-        back = background(things[0].data)
-        moving = back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")
-        how = ANIMATION if len(things) == 1 and moving else OBJECTS
-    moments: Iterable[int | None] = (None,)
-    if how == ANIMATION:
-        things = [scene.camera] if scene.camera in things else things[:1]
-        moments = range(
+    if mode == AUTO:
+        background_image = background(cameras[0].data)
+        animated = background_image.source == "MOVIE_CLIP" or background_image.image.source in ("SEQUENCE", "MOVIE")
+        mode = ANIMATION if len(cameras) == 1 and animated else OBJECTS
+    frames: Iterable[int | None] = (None,)
+    if mode == ANIMATION:
+        cameras = [scene.camera] if scene.camera in cameras else cameras[:1]
+        frames = range(
             scene.frame_start if first is None else first, (scene.frame_end if last is None else last) + 1, max(step, 1)
         )
-    taken: set[str] = set()
-    for moment in moments:
-        if moment is not None:
-            scene.frame_set(moment)
-        for thing in things:
-            plain = re.sub(r"[^\w.-]+", "_", thing.name).strip("._") or "camera"  # in a file's name on every system
-            name = plain + ("" if moment is None else f"_{moment:04d}")
-            while name.lower() in taken:
+    used_names: set[str] = set()
+    for frame in frames:
+        if frame is not None:
+            scene.frame_set(frame)
+        for obj in cameras:
+            base = re.sub(r"[^\w.-]+", "_", obj.name).strip("._") or "camera"  # in a file's name on every system
+            name = base + ("" if frame is None else f"_{frame:04d}")
+            while name.lower() in used_names:
                 name += "_"
             try:
-                view = _view(scene, depsgraph, thing, scene.frame_current, name)
+                view = _view(scene, depsgraph, obj, scene.frame_current, name)
             except BadInputError as error:
                 problems.append(str(error))
                 continue
-            taken.add(name.lower())
+            used_names.add(name.lower())
             yield view
 
 
-def _view(scene, depsgraph, thing, moment, name) -> View:
-    back = background(thing.data)
-    moved = abs(back.scale - 1), *map(abs, back.offset), abs(back.rotation)
-    if max(moved) > 1e-6 or back.use_flip_x or back.use_flip_y:
-        raise BadInputError(f"The background of camera '{thing.name}' is moved, scaled, turned or flipped; reset it.")
-    path = picture(back, moment, thing.name)
-    camera = camera_of(thing.evaluated_get(depsgraph), read_header(path), frame_size(scene, thing), back.frame_method)
-    return View(name, camera, path, {told: float(thing[key]) for key, told in PROPERTIES if key in thing})
+def _view(scene, depsgraph, obj, frame, name) -> View:
+    background_image = background(obj.data)
+    displacement = abs(background_image.scale - 1), *map(abs, background_image.offset), abs(background_image.rotation)
+    if max(displacement) > 1e-6 or background_image.use_flip_x or background_image.use_flip_y:
+        raise BadInputError(f"The background of camera '{obj.name}' is moved, scaled, turned or flipped; reset it.")
+    path = picture(background_image, frame, obj.name)
+    camera = camera_of(
+        obj.evaluated_get(depsgraph), read_header(path), frame_size(scene, obj), background_image.frame_method
+    )
+    return View(name, camera, path, {field: float(obj[key]) for key, field in PROPERTIES if key in obj})
 
 
-def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> Path:
-    """The file that a background shows at frame `moment`; raises `BadInputError` where there is none that is EXR.
+def picture(background_image: bpy.types.CameraBackgroundImage, frame: int, owner: str) -> Path:
+    """The file that a background shows at frame `frame`; raises `BadInputError` where there is none that is EXR.
 
     Numbers of sequences follow `BKE_image_user_frame_get` and `get_sequence_fname` in Blender's source.
     """
-    clip = back.source == "MOVIE_CLIP"
-    shown = back.clip if clip else back.image
-    path, problem = Path(bpy.path.abspath(shown.filepath, library=shown.library)), ""
-    if shown.source == "SEQUENCE":
+    clip = background_image.source == "MOVIE_CLIP"
+    source = background_image.clip if clip else background_image.image
+    path, problem = Path(bpy.path.abspath(source.filepath, library=source.library)), ""
+    if source.source == "SEQUENCE":
         if clip:
             first = _DIGITS.search(path.stem)
-            moment += (int(first[1]) if first else 0) - shown.frame_start + shown.frame_offset
+            frame += (int(first[1]) if first else 0) - source.frame_start + source.frame_offset
         else:
-            user = back.image_user
-            count, moment = user.frame_duration, moment - user.frame_start + 1
+            user = background_image.image_user
+            count, frame = user.frame_duration, frame - user.frame_start + 1
             if user.use_cyclic and count:
-                moment = (moment - 1) % count + 1
-            if count and not 1 <= moment <= count:
-                raise BadInputError(f"Camera '{owner}' has no picture at frame {moment + user.frame_start - 1}.")
-            moment += user.frame_offset
-        path = path.with_stem(_DIGITS.sub(lambda found: f"{moment:0{len(found[1])}d}", path.stem, count=1))
-    elif shown.source == "FILE" and shown.packed_file and not path.is_file():
+                frame = (frame - 1) % count + 1
+            if count and not 1 <= frame <= count:
+                raise BadInputError(f"Camera '{owner}' has no picture at frame {frame + user.frame_start - 1}.")
+            frame += user.frame_offset
+        path = path.with_stem(_DIGITS.sub(lambda digits: f"{frame:0{len(digits[1])}d}", path.stem, count=1))
+    elif source.source == "FILE" and source.packed_file and not path.is_file():
         problem = (
             f"The picture behind camera '{owner}' is packed into the file; unpack it (File, External Data) so that it "
             "can be read."
         )
-    elif shown.source == "MOVIE":
+    elif source.source == "MOVIE":
         problem = (
             f"Camera '{owner}' has the film '{path.name}' behind it; materials need linear radiance: "
             "give a sequence of EXR pictures."
         )
     if not problem and path.suffix.lower() != ".exr":
         problem = (
-            f"Camera '{owner}' has the picture '{path.name or shown.name}' behind it, which is no EXR; materials need "
+            f"Camera '{owner}' has the picture '{path.name or source.name}' behind it, which is no EXR; materials need "
             "linear radiance."
         )
     if not problem and not path.is_file():

@@ -1,7 +1,7 @@
-"""Objects of the open scene as one mesh of triangles, and the way back from each triangle to its face.
+"""Objects of the open scene as one mesh of triangles, with the face that each triangle was cut from.
 
-What is read is what the viewport shows: modifiers and instances evaluated, in world space. Materials are told by
-object, so each object becomes an instance of the capture; so does each object that an instanced collection shows.
+Read as the viewport shows it: modifiers and instances evaluated, in world space. Each object has its own materials, so
+each becomes an instance of the capture; so does each object that an instanced collection shows.
 """
 
 import hashlib
@@ -15,8 +15,8 @@ from ...core.errors import BadInputError
 from ..data.arrays import faces_of, make_mesh, triangles_of, vertices_of
 from ..data.unwrap import Polygons
 
-KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
-"""Types of object that may have faces to show; an empty has those of the collection that it instances."""
+OBJECT_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
+"""Types of objects that may have faces; an empty has those of the collection that it instances."""
 
 
 @dataclass
@@ -26,10 +26,10 @@ class Part:
     Attributes
     ----------
     name : str
-        As the artist reads it.
+        As displayed to the artist.
     class_name : str
-        Objects of one mesh share it, as they are of one kind.
-    thing : bpy.types.Object
+        Shared by objects with the same mesh, as they are of one kind.
+    obj : bpy.types.Object
         The artist's object that shows it.
     own : bool
         Its faces are those of the object's mesh, one by one and in their order, so that materials can be put there.
@@ -41,7 +41,7 @@ class Part:
     object_id: int
     name: str
     class_name: str
-    thing: bpy.types.Object
+    obj: bpy.types.Object
     own: bool = True
     pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
 
@@ -52,8 +52,8 @@ class Part:
 
     def mesh(self) -> bpy.types.Mesh:
         """Its faces as a mesh of their own, in world coordinates, flat."""
-        one = joined([self])
-        return make_mesh(self.name, one.vertices, one.polygons.vertex, one.polygons.start[:-1])
+        merged = joined([self])
+        return make_mesh(self.name, merged.vertices, merged.polygons.vertex, merged.polygons.start[:-1])
 
 
 @dataclass(frozen=True)
@@ -79,61 +79,64 @@ class SceneMesh:
     corner_start: dict[int, int]
 
 
-def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -> list[Part]:
-    """Read what the objects show.
+def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) -> list[Part]:
+    """Read the evaluated faces of objects.
 
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
-        Brought up to date.
-    things : iterable of bpy.types.Object
-        The artist's; those without a surface are passed over.
+        Up to date.
+    objects : iterable of bpy.types.Object
+        The artist's; those without a surface are skipped.
 
     Returns
     -------
     list of Part
-        In the order of `things`; one without faces is left out. Same scene, same numbers.
+        In the order of `objects`; one without faces is left out. Same scene, same numbers.
 
     Raises
     ------
     BadInputError
         An object has vertices that are not finite.
     """
-    wanted = {thing: rank for rank, thing in enumerate(things) if thing.type in KINDS}
-    found: dict[tuple, Part] = {}
-    for shown in depsgraph.object_instances:
-        owner = shown.parent.original if shown.is_instance and shown.parent else shown.object.original
-        if owner not in wanted or shown.object.type != "MESH":
+    ranks = {obj: rank for rank, obj in enumerate(objects) if obj.type in OBJECT_TYPES}
+    by_key: dict[tuple, Part] = {}
+    for instance in depsgraph.object_instances:
+        original = instance.parent.original if instance.is_instance and instance.parent else instance.object.original
+        if original not in ranks or instance.object.type != "MESH":
             continue
-        instanced = shown.is_instance and owner.type == "EMPTY"
-        # What a mesh object spreads over itself (geometry nodes, particles) belongs to it.
-        key = (wanted[owner], *(shown.persistent_id if instanced else ()))
-        part = found.get(key)
+        instanced = instance.is_instance and original.type == "EMPTY"
+        # Instances that a mesh object generates itself (geometry nodes, particles) belong to it.
+        key = (ranks[original], *(instance.persistent_id if instanced else ()))
+        part = by_key.get(key)
         if part is None:
-            name = f"{owner.name}/{shown.object.name}" if instanced else owner.name
-            part = found[key] = Part(0, name, "", owner)
-        data = shown.object.data
+            name = f"{original.name}/{instance.object.name}" if instanced else original.name
+            part = by_key[key] = Part(0, name, "", original)
+        data = instance.object.data
         part.own &= (
-            not shown.is_instance and not part.pieces and owner.type == "MESH" and same_topology(data, owner.data)
+            not instance.is_instance
+            and not part.pieces
+            and original.type == "MESH"
+            and same_topology(data, original.data)
         )
-        vertices, loops = vertices_of(data, shown.matrix_world), triangles_of(data, "loops")
+        vertices, loops = vertices_of(data, instance.matrix_world), triangles_of(data, "loops")
         if not np.isfinite(vertices).all():
-            raise BadInputError(f"Object '{owner.name}' has vertices that are not finite; mend its mesh first.")
-        if shown.matrix_world.is_negative:  # mirrored: front is where the other order of corners says
+            raise BadInputError(f"Object '{original.name}' has vertices that are not finite; mend its mesh first.")
+        if instance.matrix_world.is_negative:  # mirrored: the front is given by the reverse order of corners
             loops = loops[:, [0, 2, 1]]
         part.pieces.append((vertices, *faces_of(data), loops))
-    parts = [found[key] for key in sorted(found) if any(len(loops) for *_, loops in found[key].pieces)]
+    parts = [by_key[key] for key in sorted(by_key) if any(len(loops) for *_, loops in by_key[key].pieces)]
     kinds: dict[bpy.types.ID, str] = {}
     for number, part in enumerate(parts):
         part.object_id = number
-        part.class_name = kinds.setdefault(part.thing.data, part.name) if part.own else part.name
+        part.class_name = kinds.setdefault(part.obj.data, part.name) if part.own else part.name
     return parts
 
 
-def same_topology(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+def same_topology(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces in the same order, wherever their vertices are."""
-    return len(one.vertices) == len(other.vertices) and all(
-        np.array_equal(a, b) for a, b in zip(faces_of(one), faces_of(other))
+    return len(first.vertices) == len(second.vertices) and all(
+        np.array_equal(a, b) for a, b in zip(faces_of(first), faces_of(second))
     )
 
 
@@ -153,11 +156,11 @@ def joined(parts: Iterable[Part]) -> SceneMesh:
     for part in parts:
         corner_start[part.object_id] = first_corner
         for points, start, corner, loop in part.pieces:
-            shifted = points, start[:-1] + first_corner, corner + first_vertex, loop + first_corner
-            for column, values in zip(columns, (*shifted, np.full(len(loop), part.object_id))):
+            offset_arrays = points, start[:-1] + first_corner, corner + first_vertex, loop + first_corner
+            for column, values in zip(columns, (*offset_arrays, np.full(len(loop), part.object_id))):
                 column.append(values)
             first_vertex += len(points)
             first_corner += len(corner)
-    start, corner, loop, ids = (np.concatenate(one).astype(np.int32) for one in (starts, corners, loops, ids))
+    start, corner, loop, ids = (np.concatenate(arrays).astype(np.int32) for arrays in (starts, corners, loops, ids))
     polygons = Polygons(np.append(start, np.int32(first_corner)), corner, loop)
     return SceneMesh(np.concatenate(vertices), corner[loop], ids, polygons, corner_start)

@@ -1,1 +1,1 @@
-"""New light on the room: lights, exposure, preview, before and after, things set into it."""
+"""New light on the room: lights, exposure, preview, before and after, virtual objects."""

@@ -1,7 +1,7 @@
 """Where a new light stands: in free space of the room, where it lights best what the camera looks at.
 
-Places are tried out, not drawn: of those near what a preset wishes for, the one is taken that has room around it and
-lights most of what the picture shows, evenly.
+Candidate positions near the one that a preset prefers are scored; the best has free space around it and lights most of
+what the picture shows, evenly.
 """
 
 import math
@@ -16,18 +16,18 @@ from mathutils import Matrix, Quaternion, Vector
 from ..light.room import bounds, cast, leaves, picture_ray, view_direction
 from .subject import Subject
 
-CLEAR = 0.05
-"""Metres that a light keeps off what is behind it."""
-_OFF_CEILING = 0.45
-"""Metres below the room's top: a lamp closer to a ceiling burns its edge into it."""
+CLEARANCE = 0.05
+"""Distance that a light keeps from surfaces, metres."""
+_CEILING_MARGIN = 0.45
+"""Metres below the room's top: a lamp closer to a ceiling overexposes it."""
 _UP = Vector((0, 0, 1))
-_AROUND = [
-    Vector(one).normalized() for one in product((-1, 0, 1), repeat=3) if any(one) and not (one[2] and any(one[:2]))
+_PROBE_DIRECTIONS = [
+    Vector(step).normalized() for step in product((-1, 0, 1), repeat=3) if any(step) and not (step[2] and any(step[:2]))
 ]
 
 
 class Placement(NamedTuple):
-    """Where a light is, how it is turned, its size in metres, and whether it shines in through an opening."""
+    """Position, rotation and size in metres of a light, and whether it shines in through an opening."""
 
     origin: Vector
     rotation: Quaternion
@@ -36,177 +36,186 @@ class Placement(NamedTuple):
     outside: bool = False
 
 
-class Wish(NamedTuple):
-    """Where a light would stand in an empty room, seen from its target.
+class Preference(NamedTuple):
+    """Where a light would stand in an empty room, relative to its target.
 
-    Degrees beside the camera (to either side) and upwards; metres from the target; metres of free room around it.
+    Azimuth from the camera's direction (to either side) and elevation in degrees; distance from the target and
+    clearance in metres.
     """
 
     side: float
     up: float
     distance: float
-    room: float
+    clearance: float
 
 
 def softbox_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     """A key light: to one side of the camera, a little above, with room around it."""
-    return _sheet(scene, subject, Wish(40, 35, 2.2, 0.4), 0.9, 0.9)
+    return _area_light(scene, subject, Preference(40, 35, 2.2, 0.4), 0.9, 0.9)
 
 
 def spot_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     """From above, a little on the camera's side of the target."""
-    return _sheet(scene, subject, Wish(0, 60, 2.4, 0.15), 0.2, 0.2)
+    return _area_light(scene, subject, Preference(0, 60, 2.4, 0.15), 0.2, 0.2)
 
 
 def window_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
-    """In an opening of the room, else before a wall, to the side; what lights most of the picture."""
+    """In an opening of the room, else in front of a wall, to the side; the one that lights most of the picture."""
     low, high = bounds(scene)
-    storey, stand = high.z - low.z, _before(scene, subject.target)
-    middle = Vector((stand.x, stand.y, low.z + min(1.5, 0.58 * storey)))
-    best, found = 0.0, None
+    room_height, start = high.z - low.z, _in_front_of(scene, subject.target)
+    center = Vector((start.x, start.y, low.z + min(1.5, 0.58 * room_height)))
+    best_score, opening = 0.0, None
     for side in (sign * side for side in range(30, 151, 15) for sign in (1, -1)):
-        direction = _towards(-view_direction(scene), side, 0)
-        hit, wall = cast(scene, middle, direction), _exit(middle, direction, low, high)
-        distance = (min(hit.distance, wall) if hit else wall) - CLEAR
+        direction = _rotated(-view_direction(scene), side, 0)
+        hit, wall = cast(scene, center, direction), _exit_distance(center, direction, low, high)
+        distance = (min(hit.distance, wall) if hit else wall) - CLEARANCE
         if distance < 0.6 * wall:
-            continue  # before a cupboard: the light has to stand near the room's edge
-        place, inward = middle + direction * distance, -direction
+            continue  # in front of a cupboard: the light has to stand near the room's edge
+        position, inward = center + direction * distance, -direction
         if hit and abs(hit.normal.z) < 0.5:
             inward = Vector((*hit.normal.xy, 0)).normalized()
-        score = _lit(scene, subject, place, inward) * (1.5 if hit is None or leaves(scene, middle, direction) else 1.0)
-        if score > best:
-            best, found = score, (place, inward)
-    if found is None:  # a room too narrow for any of it
+        score = _illumination(scene, subject, position, inward) * (
+            1.5 if hit is None or leaves(scene, center, direction) else 1.0
+        )
+        if score > best_score:
+            best_score, opening = score, (position, inward)
+    if opening is None:  # a room too narrow for any of it
         return softbox_place(scene, subject)
-    place, inward = found
-    sizes = []
-    for axis, wanted in ((inward.cross(_UP), 1.2), (_UP, min(1.3, 0.55 * storey))):
-        free = min(_way(scene, place, axis * sign, wanted / 2) for sign in (1, -1))
-        sizes.append(max(2 * (free - (CLEAR if free < wanted / 2 else 0.0)), 0.3))
-    return Placement(place, _facing(inward), *sizes)
+    position, inward = opening
+    dimensions = []
+    for axis, wanted_size in ((inward.cross(_UP), 1.2), (_UP, min(1.3, 0.55 * room_height))):
+        free_distance = min(_free_distance(scene, position, axis * sign, wanted_size / 2) for sign in (1, -1))
+        dimensions.append(max(2 * (free_distance - (CLEARANCE if free_distance < wanted_size / 2 else 0.0)), 0.3))
+    return Placement(position, _rotation_towards(inward), *dimensions)
 
 
 def sun_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
-    """Low and from the side: through an opening as a sun, else a parallel beam as a window would let it in."""
-    best, found = 0.02, None
+    """Low and from the side: through an opening as a sun, else a parallel beam as through a window."""
+    best_share, sun_direction = 0.02, None
     # Without a roof a sun would light all of the room and not come in through an opening.
-    if cast(scene, _before(scene, subject.target), _UP) is not None:
+    if cast(scene, _in_front_of(scene, subject.target), _UP) is not None:
         starts = [Vector(p) + 0.02 * Vector(n) for p, n in zip(subject.points, subject.normals, strict=True)]
         for up, side in product((14, 22, 30, 38), range(15, 346, 15)):
-            direction = _towards(-view_direction(scene), side, up)
-            share = subject.weights * (subject.normals @ np.array(direction))
-            through = sum(
-                share[k] for k in range(0, len(starts), 2) if share[k] > 0 and leaves(scene, starts[k], direction)
+            direction = _rotated(-view_direction(scene), side, up)
+            shares = subject.weights * (subject.normals @ np.array(direction))
+            visible_share = sum(
+                shares[k] for k in range(0, len(starts), 2) if shares[k] > 0 and leaves(scene, starts[k], direction)
             )
-            if through > best:
-                best, found = through, direction
-    if found is None:
-        return _sheet(scene, subject, Wish(75, 16, 3.2, 0.25), 0.9, 1.1)
-    origin = subject.target + found * (_exit(subject.target, found, *bounds(scene)) + 1.0)
-    return Placement(origin, _facing(-found), 1.0, 1.2, outside=True)
+            if visible_share > best_share:
+                best_share, sun_direction = visible_share, direction
+    if sun_direction is None:
+        return _area_light(scene, subject, Preference(75, 16, 3.2, 0.25), 0.9, 1.1)
+    origin = subject.target + sun_direction * (_exit_distance(subject.target, sun_direction, *bounds(scene)) + 1.0)
+    return Placement(origin, _rotation_towards(-sun_direction), 1.0, 1.2, outside=True)
 
 
-def _sheet(scene, subject: Subject, wish: Wish, width: float, height: float) -> Placement:
-    """A light of at most that size at the best place, no larger than the room around it and its distance allow."""
-    place = _best(scene, subject, wish)
-    way = subject.target - place
-    most = min(1.6 * _room_around(scene, place, 0.6), 0.5 * max(way.length, 0.6))
-    return Placement(place, _facing(way), min(width, most), min(height, most))
+def _area_light(scene, subject: Subject, preference: Preference, width: float, height: float) -> Placement:
+    """An area light of at most that size at the best position, limited by the clearance and the distance."""
+    position = _best_position(scene, subject, preference)
+    to_target = subject.target - position
+    max_size = min(1.6 * _clearance(scene, position, 0.6), 0.5 * max(to_target.length, 0.6))
+    return Placement(position, _rotation_towards(to_target), min(width, max_size), min(height, max_size))
 
 
-def _best(scene, subject: Subject, wish: Wish) -> Vector:
-    """The place that lights the subject best, weighed by the room around it and how near it comes to the wish."""
-    top = bounds(scene)[1].z - _OFF_CEILING
-    best, found = 0.0, None
-    for place, liking in _candidates(scene, subject, wish):
-        way = subject.target - place
-        liking *= min(2 * way.length / wish.distance, 1.0) ** 2
-        liking *= 0.3 + 0.7 * _room_around(scene, place, wish.room) / wish.room
-        liking *= min(1.0, max(0.2, 1 - 2 * (place.z - top) / _OFF_CEILING))
-        score = liking * _lit(scene, subject, place, way.normalized()) if liking > best else 0.0
-        if score > best:
-            best, found = score, place
-    if found is None:  # nothing has any room: on the camera's side of the target
-        direction = (_before(scene, subject.target) - subject.target).normalized() or _UP
-        return subject.target + direction * _free(scene, subject.target, direction, wish.distance / 2)
-    return found
+def _best_position(scene, subject: Subject, preference: Preference) -> Vector:
+    """The position that lights the subject best, weighted by its clearance and how near it is to the preference."""
+    top = bounds(scene)[1].z - _CEILING_MARGIN
+    best_score, best_position = 0.0, None
+    for position, weight in _candidates(scene, subject, preference):
+        to_target = subject.target - position
+        weight *= min(2 * to_target.length / preference.distance, 1.0) ** 2
+        weight *= 0.3 + 0.7 * _clearance(scene, position, preference.clearance) / preference.clearance
+        weight *= min(1.0, max(0.2, 1 - 2 * (position.z - top) / _CEILING_MARGIN))
+        score = weight * _illumination(scene, subject, position, to_target.normalized()) if weight > best_score else 0.0
+        if score > best_score:
+            best_score, best_position = score, position
+    if best_position is None:  # nowhere is free space: on the camera's side of the target
+        direction = (_in_front_of(scene, subject.target) - subject.target).normalized() or _UP
+        return subject.target + direction * _usable_distance(scene, subject.target, direction, preference.distance / 2)
+    return best_position
 
 
-def _candidates(scene, subject: Subject, wish: Wish) -> Iterator[tuple[Vector, float]]:
-    """Places with how well they lie, 0...1: around the target, and beside the camera, which stands free."""
+def _candidates(scene, subject: Subject, preference: Preference) -> Iterator[tuple[Vector, float]]:
+    """Positions with weights, 0...1: around the target, and beside the camera, which stands in free space."""
     camera = -view_direction(scene)
     for up, turn, sign in product((1.0, 0.6, 1.4), (0, -20, 20, 35), (1, -1)):
-        direction = _towards(camera, sign * (wish.side + turn), min(wish.up * up, 80))
-        liking = direction.dot(_towards(camera, sign * wish.side, wish.up))
-        free = _free(scene, subject.target, direction, wish.distance)
+        direction = _rotated(camera, sign * (preference.side + turn), min(preference.up * up, 80))
+        weight = direction.dot(_rotated(camera, sign * preference.side, preference.up))
+        free_distance = _usable_distance(scene, subject.target, direction, preference.distance)
         yield from (
-            (subject.target + direction * share * wish.distance, liking)
+            (subject.target + direction * share * preference.distance, weight)
             for share in (1.0, 0.7, 0.45)
-            if share * wish.distance <= free
+            if share * preference.distance <= free_distance
         )
     if scene.camera is not None:
         eye, right = scene.camera.matrix_world.translation, _UP.cross(camera)
         for step in (right * across + 0.4 * abs(across) * _UP for across in (0.9, -0.9, 0.5, -0.5, 0.0)):
-            if _way(scene, eye, step, step.length + 0.2) > step.length:
+            if _free_distance(scene, eye, step, step.length + 0.2) > step.length:
                 yield eye + step, 0.8
 
 
-def _lit(scene, subject: Subject, place: Vector, shines: Vector) -> float:
-    """How much of the picture a lamp at `place` lights, and how evenly, at most 1."""
-    ways = np.array(place) - subject.points
-    distances = np.maximum(np.linalg.norm(ways, axis=1), 0.05)
-    ways /= distances[:, None]
-    light = np.maximum((ways * subject.normals).sum(1), 0) * np.maximum(-ways @ np.array(shines), 0) / distances**2
-    for k in np.flatnonzero(light > 0):
-        if _way(scene, place, -Vector(ways[k]), distances[k]) < distances[k] - 0.03:
-            light[k] = 0.0
-    got = light * max((Vector(place) - subject.target).length, 0.3) ** 2
-    return float(subject.weights @ (np.minimum(got, 1.0) - 0.1 * np.clip(got - 2.0, 0.0, 5.0)))
+def _illumination(scene, subject: Subject, position: Vector, axis: Vector) -> float:
+    """How much of the picture a lamp at `position` lights, and how evenly, at most 1."""
+    directions = np.array(position) - subject.points
+    distances = np.maximum(np.linalg.norm(directions, axis=1), 0.05)
+    directions /= distances[:, None]
+    irradiance = (
+        np.maximum((directions * subject.normals).sum(1), 0)
+        * np.maximum(-directions @ np.array(axis), 0)
+        / distances**2
+    )
+    for k in np.flatnonzero(irradiance > 0):
+        if _free_distance(scene, position, -Vector(directions[k]), distances[k]) < distances[k] - 0.03:
+            irradiance[k] = 0.0
+    relative = irradiance * max((Vector(position) - subject.target).length, 0.3) ** 2
+    return float(subject.weights @ (np.minimum(relative, 1.0) - 0.1 * np.clip(relative - 2.0, 0.0, 5.0)))
 
 
-def _way(scene, place: Vector, direction: Vector, wanted: float) -> float:
-    """Metres to the first surface along a ray, at most `wanted`."""
-    hit = cast(scene, place, direction, wanted)
-    return hit.distance if hit else wanted
+def _free_distance(scene, position: Vector, direction: Vector, limit: float) -> float:
+    """Metres to the first surface along a ray, at most `limit`."""
+    hit = cast(scene, position, direction, limit)
+    return hit.distance if hit else limit
 
 
-def _room_around(scene, place: Vector, wanted: float) -> float:
-    """Metres to the nearest surface, at most `wanted`; 0 outside the room."""
+def _clearance(scene, position: Vector, limit: float) -> float:
+    """Metres to the nearest surface, at most `limit`; 0 outside the room."""
     low, high = bounds(scene)
-    if any(not low[k] + CLEAR <= place[k] <= high[k] - CLEAR for k in range(3)):
+    if any(not low[k] + CLEARANCE <= position[k] <= high[k] - CLEARANCE for k in range(3)):
         return 0.0
-    return min(_way(scene, place, direction, wanted) for direction in _AROUND)
+    return min(_free_distance(scene, position, direction, limit) for direction in _PROBE_DIRECTIONS)
 
 
-def _before(scene, target: Vector) -> Vector:
-    """A place in front of the target, on the camera's side: on the target itself a ray might start within a wall."""
+def _in_front_of(scene, target: Vector) -> Vector:
+    """A point in front of the target, on the camera's side: at the target itself a ray might start within a wall."""
     if scene.camera is None:
         return target
-    way = picture_ray(scene)[0] - target
-    return target + way * min(0.6 / max(way.length, 1e-6), 0.5)
+    to_camera = picture_ray(scene)[0] - target
+    return target + to_camera * min(0.6 / max(to_camera.length, 1e-6), 0.5)
 
 
-def _towards(level: Vector, side: float, up: float) -> Vector:
-    """A level direction turned by `side` degrees about +Z and raised by `up` degrees."""
-    turned = Matrix.Rotation(math.radians(side), 3, "Z") @ level
-    return turned * math.cos(math.radians(up)) + _UP * math.sin(math.radians(up))
+def _rotated(direction: Vector, side: float, up: float) -> Vector:
+    """A horizontal direction rotated by `side` degrees about +Z and raised by `up` degrees."""
+    rotated = Matrix.Rotation(math.radians(side), 3, "Z") @ direction
+    return rotated * math.cos(math.radians(up)) + _UP * math.sin(math.radians(up))
 
 
-def _free(scene, target: Vector, direction: Vector, wanted: float) -> float:
-    """How far from the target a light may stand: `wanted`, but inside the room and clear of what is in the way."""
-    start, wall = target + direction * 0.02, _exit(target, direction, *bounds(scene))
-    limit = _way(scene, start, direction, wall)
-    return max(min(wanted, 0.9 * limit, limit - CLEAR), 0.1)
+def _usable_distance(scene, target: Vector, direction: Vector, limit: float) -> float:
+    """How far from the target a light may stand: `limit`, but inside the room and in front of any surface."""
+    start, wall = target + direction * 0.02, _exit_distance(target, direction, *bounds(scene))
+    free_distance = _free_distance(scene, start, direction, wall)
+    return max(min(limit, 0.9 * free_distance, free_distance - CLEARANCE), 0.1)
 
 
-def _exit(place: Vector, direction: Vector, low: Vector, high: Vector) -> float:
-    """Distance along a ray from within a box to its side; 0 from without."""
-    ways = [
-        ((high if direction[k] > 0 else low)[k] - place[k]) / direction[k] for k in range(3) if abs(direction[k]) > 1e-9
+def _exit_distance(position: Vector, direction: Vector, low: Vector, high: Vector) -> float:
+    """Distance along a ray from inside a box to its side; 0 from outside."""
+    distances = [
+        ((high if direction[k] > 0 else low)[k] - position[k]) / direction[k]
+        for k in range(3)
+        if abs(direction[k]) > 1e-9
     ]
-    return max(min(ways, default=0.0), 0.0)
+    return max(min(distances, default=0.0), 0.0)
 
 
-def _facing(direction: Vector) -> Quaternion:
-    """The rotation that turns a lamp, which shines along -Z, towards `direction`, its own Y up."""
+def _rotation_towards(direction: Vector) -> Quaternion:
+    """The rotation of a lamp, which emits along -Z, towards `direction`, with its Y axis up."""
     return direction.to_track_quat("-Z", "Y")

@@ -1,7 +1,7 @@
-"""Before and after: one view under the captured and under the present light, side by side.
+"""Before and after: one view under the captured and under the current light, side by side.
 
 In background mode the pictures are rendered here. Beside a window the command line renders a saved copy of the scene
-(`save_copy`), so that the window never freezes, nothing of the open scene changes, and a stop ends a process.
+(`save_copy`), so that the window never freezes, the open scene does not change, and stopping ends a process.
 """
 
 import os
@@ -17,66 +17,66 @@ from ...core.io.folder import MATERIALS, SCENE
 from ...core.progress import Progress
 from ..marks import RESULT
 from ..refused import refused
-from .pictures import beside, check_format, seconds_expected, shoot, ticking
+from .pictures import check_format, render_to_file, save_side_by_side, seconds_expected, timed_progress
 from .setup import captured_light
 
 NAME = "Before and After"
 """Name of the image in Blender."""
 
 
-def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
+def render_pair(scene: bpy.types.Scene, target: Path, progress: Progress | None = None) -> None:
     """Render both pictures, one after the other, and save them side by side; within `pictures.settings_kept`."""
-    ending = check_format(out)
+    ending = check_format(target)
     if scene.camera is None:
         raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
     progress = progress or Progress()
-    with refused(f"'{out}' can't be written", "choose another folder"):
-        out.parent.mkdir(parents=True, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(
-            prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent, ignore_cleanup_errors=True
+    with refused(f"'{target}' can't be written", "choose another folder"):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary_folder = tempfile.TemporaryDirectory(
+            prefix=f"{TEMPORARY}{os.getpid()}-", dir=target.parent, ignore_cleanup_errors=True
         )
-    with scratch as folder:
+    with temporary_folder as folder:
         before, after = Path(folder, f"before{ending}"), Path(folder, f"after{ending}")
         progress.stage("before")
         with captured_light(scene):
             expected = seconds_expected(scene)
-            began = time.monotonic()
-            with ticking(progress, expected):
-                shoot(scene, before)
-            taken = time.monotonic() - began
+            start = time.monotonic()
+            with timed_progress(progress, expected):
+                render_to_file(scene, before)
+            seconds = time.monotonic() - start
         progress.done()
         progress.stage("after")
-        with ticking(progress, taken):
-            shoot(scene, after)
+        with timed_progress(progress, seconds):
+            render_to_file(scene, after)
         progress.done()
-        beside(before, after, out)
+        save_side_by_side(before, after, target)
 
 
 def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool]:
-    """Where a picture of a scene goes unless told.
+    """Default folder of a picture of a scene.
 
     The result folder that the open file lies in, else the one that the room came from, else the `chosen` one, else
-    beside the file; a folder that is gone or can't be written to is passed over. Where none is left it is Blender's own
-    for things of passing use.
+    beside the file; a folder that is missing or can't be written to is skipped. Where none is left it is Blender's
+    temporary folder.
 
     Returns
     -------
     (Path, bool)
-        The folder; whether it stays when Blender ends.
+        The folder; whether it persists when Blender quits.
     """
     beside_file = bpy.path.abspath("//") if bpy.data.filepath else ""
-    places = [thing[RESULT] for thing in (*scene.collection.children_recursive, *scene.objects) if RESULT in thing]
-    places += [bpy.path.abspath(chosen), beside_file]
+    candidates = [item[RESULT] for item in (*scene.collection.children_recursive, *scene.objects) if RESULT in item]
+    candidates += [bpy.path.abspath(chosen), beside_file]
     if beside_file and (Path(beside_file) / MATERIALS).is_file():
-        places.insert(0, beside_file)
-    for place in dict.fromkeys(places):
-        if place and Path(place).is_absolute() and Path(place).is_dir() and os.access(place, os.W_OK):
-            return Path(place), True
+        candidates.insert(0, beside_file)
+    for candidate in dict.fromkeys(candidates):
+        if candidate and Path(candidate).is_absolute() and Path(candidate).is_dir() and os.access(candidate, os.W_OK):
+            return Path(candidate), True
     return Path(bpy.app.tempdir), False
 
 
 def save_copy(folder: Path) -> None:
-    """Save what is open as a copy that the command `relight` can open; what is open stays as it is."""
+    """Save a copy of the open file for the command `relight`; the open file stays as it is."""
     with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), copy=True, compress=False, relative_remap=True)
 

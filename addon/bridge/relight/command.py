@@ -16,12 +16,12 @@ from ..light.kelvin import rgb_of
 from ..render_device import use_device
 from .before_after import render_pair
 from .lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
-from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking
+from .pictures import CYCLES, check_format, prepare, render_to_file, seconds_expected, settings_kept, timed_progress
 
 
 @dataclass(frozen=True)
 class Light:
-    """What is to be changed about the light; None leaves it as the file has it.
+    """Changes to the light; None leaves it as in the file.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Light:
     added : dict of str to (float, str)
         Strength of each new light and its unit (`light.units.ROOM` and its neighbours), by `relight.lights.PRESETS`.
     kelvin : float or None
-        Temperature of the new lights; None: what suits each.
+        Color temperature of the new lights; None: the default of each.
     """
 
     lamps: str | None = None
@@ -56,7 +56,7 @@ def relight(
     percentage: int = 100,
     progress: Progress | None = None,
     device: str | None = None,
-    of: str | None = None,
+    scene_name: str | None = None,
 ) -> list[str]:
     """Open a result's scene, change its light, render.
 
@@ -75,8 +75,8 @@ def relight(
     percentage : int
         Of the frame's size.
     device : str, optional
-        See `render_device.use_device`; by default the file's, on which Cycles may have no say without preferences.
-    of : str, optional
+        See `render_device.use_device`; by default the file's, which Cycles may ignore without preferences.
+    scene_name : str, optional
         Name of the scene, where the file holds several; by default the one that it was saved with.
 
     Returns
@@ -87,7 +87,7 @@ def relight(
     Raises
     ------
     BadInputError, StorageError
-        One sentence for the user; nothing is rendered if anything that was given is wrong.
+        One sentence for the user; nothing is rendered if any argument is wrong.
     """
     progress = progress or Progress()
     check_format(out)
@@ -100,7 +100,7 @@ def relight(
         raise BadInputError(
             f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture again."
         ) from error
-    scene = scene_named(of)
+    scene = scene_named(scene_name)
     if camera is not None:
         use_camera(scene, camera_named(scene, camera))
     if scene.camera is None:
@@ -114,18 +114,18 @@ def relight(
             render_pair(scene, out, progress)
         else:
             progress.stage("after")
-            with ticking(progress, seconds_expected(scene)):
-                shoot(scene, out)
+            with timed_progress(progress, seconds_expected(scene)):
+                render_to_file(scene, out)
             progress.done()
     return remarks
 
 
 def scene_named(name: str | None) -> bpy.types.Scene:
-    """A scene of the open file, made the one that is worked in; raises `BadInputError` where there is none."""
+    """A scene of the open file, made the active one; raises `BadInputError` where there is none."""
     scene = bpy.context.scene if name is None else bpy.data.scenes.get(name)
     if scene is None:
-        known = ", ".join(f"'{one.name}'" for one in bpy.data.scenes)
-        raise BadInputError(f"There is no scene '{name}' in the file; it holds {known}.")
+        names = ", ".join(f"'{item.name}'" for item in bpy.data.scenes)
+        raise BadInputError(f"There is no scene '{name}' in the file; it holds {names}.")
     if bpy.context.window is not None:
         bpy.context.window.scene = scene
     return scene
@@ -141,8 +141,8 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
         outside.use_hdri(scene, light.hdri, outside.usual_radiance(scene))
     if scene.world is not None and light.world is not None:
         if light.world not in ("on", "off"):
-            told = f"Option --world takes on, off or an angle in degrees, not '{light.world}'."
-            outside.set_rotation(scene.world, math.radians(_number(light.world, told)))
+            message = f"Option --world takes on, off or an angle in degrees, not '{light.world}'."
+            outside.set_rotation(scene.world, math.radians(_number(light.world, message)))
         outside.set_on(scene.world, light.world != "off")
     if scene.world is not None and light.world_strength is not None:
         outside.set_factor(scene.world, light.world_strength)
@@ -152,17 +152,17 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
 
 
 def set_lamps(scene: bpy.types.Scene, text: str) -> None:
-    """Obey the option ``--lamps``; every part of it is checked before anything changes."""
-    wanted = []
+    """Apply the option ``--lamps``; all of it is checked before anything changes."""
+    changes = []
     for part in text.split(",") if text not in ("on", "off") else ():
-        name, sign, value = part.rpartition("=")
-        if not sign:
+        name, separator, value = part.rpartition("=")
+        if not separator:
             raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
-        factor = {"off": None, "on": 1.0}
-        if value not in factor:
-            factor[value] = _number(value, f"Option --lamps takes factors of at least 0, not '{value}'.", 0.0)
-        wanted += [(lamp, factor[value]) for lamp in relight_lamps.lamp_named(scene, name)]
-    for lamp, value in wanted:
+        factors = {"off": None, "on": 1.0}
+        if value not in factors:
+            factors[value] = _number(value, f"Option --lamps takes factors of at least 0, not '{value}'.", 0.0)
+        changes += [(lamp, factors[value]) for lamp in relight_lamps.lamp_named(scene, name)]
+    for lamp, value in changes:
         relight_lamps.set_on(lamp, value is not None)
         if value is not None:
             relight_lamps.set_factor(lamp, value)
@@ -174,26 +174,28 @@ def set_lamps(scene: bpy.types.Scene, text: str) -> None:
 def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The camera of a frame, by its number from 0 or its name; raises `BadInputError`."""
     cameras = frame_cameras(scene)
-    found = {str(number): one for number, one in enumerate(cameras)} | {one.name: one for one in reversed(cameras)}
-    if name in found:
-        return found[name]
-    some = ", ".join(f"'{c.name}'" for c in cameras[:3])
-    known = (
-        f"take a number from 0 to {len(cameras) - 1} or a name such as {some}"
+    by_name = {str(number): camera for number, camera in enumerate(cameras)} | {
+        camera.name: camera for camera in reversed(cameras)
+    }
+    if name in by_name:
+        return by_name[name]
+    examples = ", ".join(f"'{c.name}'" for c in cameras[:3])
+    hint = (
+        f"take a number from 0 to {len(cameras) - 1} or a name such as {examples}"
         if cameras
         else "the scene has none at all"
     )
-    raise BadInputError(f"There is no camera '{name}'; {known}.")
+    raise BadInputError(f"There is no camera '{name}'; {hint}.")
 
 
-def _number(text: str, otherwise: str, least: float = -math.inf) -> float:
-    """A number of at least `least` in an option; raises `BadInputError` with the sentence `otherwise` for all else."""
+def _number(text: str, message: str, minimum: float = -math.inf) -> float:
+    """Parse a number of at least `minimum`; raises `BadInputError` with `message` otherwise."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value >= least):
-        raise BadInputError(otherwise)
+    if not (math.isfinite(value) and value >= minimum):
+        raise BadInputError(message)
     return value
 
 

@@ -1,6 +1,6 @@
-"""The exposure that a light asks for: a small picture is rendered and its median brought to middle grey.
+"""The exposure for a light: a small picture is rendered and its median brought to middle grey.
 
-As `scene.py` does with the median of the frames, so that the captured light asks for about the captured exposure.
+As `scene.py` does with the median of the frames, so that the captured light gives about the captured exposure.
 """
 
 import math
@@ -16,31 +16,31 @@ from .pictures import small_median
 
 CAPTURED = "scan_relight_captured_exposure"
 """Custom property of a scene: its exposure before ours, in stops."""
-_MOST: Limit[float] = 32.0
+_MAX_STOPS: Limit[float] = 32.0
 
 
 def measure(scene: bpy.types.Scene) -> float:
-    """The exposure in stops that shows the median of the present picture as middle grey."""
+    """The exposure in stops that shows the median of the current picture as middle grey."""
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
     median = small_median(scene)
     if not median > 0:
         raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
-    return min(max(math.log2(MIDDLE_GREY / median), -_MOST), _MOST)
+    return min(max(math.log2(MIDDLE_GREY / median), -_MAX_STOPS), _MAX_STOPS)
 
 
 def expose(scene: bpy.types.Scene) -> float:
-    """Set the scene's exposure to what its light asks for; returns it in stops. Raises as `measure`."""
-    asked = measure(scene)
-    _set(scene, asked)
-    return asked
+    """Set the scene's exposure by `measure`; returns it in stops. Raises as `measure`."""
+    stops = measure(scene)
+    _set(scene, stops)
+    return stops
 
 
 def _set(scene: bpy.types.Scene, stops: float) -> None:
-    """Set the exposure, that before kept for `restore`."""
+    """Set the exposure; the previous one is stored for `restore`."""
     if CAPTURED not in scene:
         scene[CAPTURED] = scene.view_settings.exposure
-    scene.view_settings.exposure = min(max(stops, -_MOST), _MOST)
+    scene.view_settings.exposure = min(max(stops, -_MAX_STOPS), _MAX_STOPS)
 
 
 def restore(scene: bpy.types.Scene) -> None:
@@ -56,7 +56,7 @@ def captured_exposure(scene: bpy.types.Scene) -> float:
 
 
 def follow(scene: bpy.types.Scene) -> None:
-    """Set the exposure to what the light asks for by `relight.estimate`, if that is known; nothing is rendered."""
+    """Set the exposure by `relight.estimate`, if that has a result; nothing is rendered."""
     stops = estimate.estimate(scene)
     if stops is None or stops == estimate.NO_LIGHT:
         return
@@ -64,7 +64,7 @@ def follow(scene: bpy.types.Scene) -> None:
 
 
 def darkness(scene: bpy.types.Scene) -> str:
-    """A sentence where the picture is much darker or brighter than the captured one, by an estimate; '' else."""
+    """A sentence where the picture is estimated much darker or brighter than the captured one; '' otherwise."""
     stops = estimate.stops(scene)
     if stops is None:
         return ""
@@ -73,8 +73,8 @@ def darkness(scene: bpy.types.Scene) -> str:
     raised = scene.view_settings.exposure - captured_exposure(scene)
     if abs(stops + raised) < 0.5:
         return ""
-    light = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
+    light_text = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
     if abs(stops) < 0.5:
-        light = "about as captured"
-    exposure = "as captured" if abs(raised) < 0.05 else f"{abs(raised):.1f} stops {'up' if raised > 0 else 'down'}"
-    return f"The light is {light}; exposure is {exposure}."
+        light_text = "about as captured"
+    exposure_text = "as captured" if abs(raised) < 0.05 else f"{abs(raised):.1f} stops {'up' if raised > 0 else 'down'}"
+    return f"The light is {light_text}; exposure is {exposure_text}."

@@ -1,4 +1,4 @@
-"""Looking at the scene exactly as a frame of the capture did, with that frame behind or before it."""
+"""Looking at the scene exactly as a frame of the capture did, with that frame behind or in front of it."""
 
 from pathlib import Path
 
@@ -23,37 +23,37 @@ def match_frame(
     Parameters
     ----------
     index : int
-        In the capture's order, clamped to what there is.
+        In the capture's order, clamped to the frames that exist.
     background : bool
-        Lay the frame's picture behind the scene, as bright as the scene's exposure shows it.
+        Show the frame's picture behind the scene, as bright as the scene's exposure shows it.
     alpha : float
         Opacity of the picture.
     front : bool
-        Lay it before the scene instead.
+        Show it in front of the scene instead.
     capture_folder : str
-        Where to look for a picture that is no longer where it was.
+        Where to look for a picture that was moved.
     size : bool
         Render at the frame's size and with its shape of pixels, too.
 
     Returns
     -------
     str
-        One sentence on what is not as it should be; '' if all is.
+        One sentence on what went wrong; '' otherwise.
     """
     cameras = frame_cameras(scene)
     if not cameras:
         return "The scene has no camera of a capture; import a capture or open a result's scene.blend first."
-    thing = cameras[min(max(index, 0), len(cameras) - 1)]
-    use_camera(scene, thing, size)
-    thing.data.show_background_images = background
-    told = show_picture(thing, alpha, front, capture_folder) if background else ""
-    if not shows_as_framed(scene, thing):
-        other = (
-            f"Frame '{thing.name}' ({thing['width']} x {thing['height']} pixels) has another shape than the "
+    obj = cameras[min(max(index, 0), len(cameras) - 1)]
+    use_camera(scene, obj, size)
+    obj.data.show_background_images = background
+    message = show_picture(obj, alpha, front, capture_folder) if background else ""
+    if not shows_as_framed(scene, obj):
+        warning = (
+            f"Frame '{obj.name}' ({obj['width']} x {obj['height']} pixels) has another shape than the "
             "picture that is rendered; turn Match Render Size on to render it whole."
         )
-        told = " ".join(filter(None, (told, other)))
-    return told
+        message = " ".join(filter(None, (message, warning)))
+    return message
 
 
 def current(scene: bpy.types.Scene) -> int:
@@ -62,36 +62,36 @@ def current(scene: bpy.types.Scene) -> int:
     return cameras.index(scene.camera) if scene.camera in cameras else -1
 
 
-def show_picture(thing: bpy.types.Object, alpha: float = 1.0, front: bool = False, capture_folder: str = "") -> str:
+def show_picture(obj: bpy.types.Object, alpha: float = 1.0, front: bool = False, capture_folder: str = "") -> str:
     """Show the picture of a frame's camera; returns one sentence where that can't be done, else ''."""
-    data = thing.data
-    shown = data.background_images[0] if data.background_images else None
-    if shown is None or shown.image is None:
-        path = picture_path(thing, capture_folder)
+    data = obj.data
+    background = data.background_images[0] if data.background_images else None
+    if background is None or background.image is None:
+        path = picture_path(obj, capture_folder)
         if path is None:
             return (
-                f"The picture of frame '{thing.name}' is not where the capture had it; choose the capture's folder "
+                f"The picture of frame '{obj.name}' is not where the capture had it; choose the capture's folder "
                 "under Capture."
             )
         try:
             image = bpy.data.images.load(str(path), check_existing=True)
         except RuntimeError:
             return f"'{path}' can't be opened as a picture."
-        shown = shown or data.background_images.new()
-        shown.image = _turned(image, path) if TURNED in thing else image
-    if shown.image.is_float:
-        shown.image.colorspace_settings.name = RADIANCE
-    # Without this Blender shows it as stored, not under the exposure and view transform of the scene beside it.
-    shown.image.use_view_as_render = True
-    shown.alpha, shown.display_depth, shown.frame_method = alpha, "FRONT" if front else "BACK", "STRETCH"
-    exposure = float(thing.get("frame_exposure", 1.0))
+        background = background or data.background_images.new()
+        background.image = _turned(image, path) if TURNED in obj else image
+    if background.image.is_float:
+        background.image.colorspace_settings.name = RADIANCE
+    # Without this Blender shows it as stored, not under the scene's exposure and view transform.
+    background.image.use_view_as_render = True
+    background.alpha, background.display_depth, background.frame_method = alpha, "FRONT" if front else "BACK", "STRETCH"
+    exposure = float(obj.get("frame_exposure", 1.0))
     if abs(exposure - 1) > 1e-3:
-        return f"Frame '{thing.name}' is shown {exposure:.2g} times as bright as the scene: it was exposed like that."
+        return f"Frame '{obj.name}' is shown {exposure:.2g} times as bright as the scene: it was exposed like that."
     return ""
 
 
 def _turned(image: bpy.types.Image, path: Path) -> bpy.types.Image:
-    """A copy of a picture of 8 or 16 bits as its EXIF shows it, which Blender does not heed; packed into the .blend."""
+    """A copy of a picture of 8 or 16 bits oriented by its EXIF, which Blender ignores; packed into the .blend."""
     name = f"{image.name} turned"
     if name in bpy.data.images:
         return bpy.data.images[name]
@@ -106,13 +106,13 @@ def _turned(image: bpy.types.Image, path: Path) -> bpy.types.Image:
     return copy
 
 
-def picture_path(thing: bpy.types.Object, capture_folder: str = "") -> Path | None:
-    """Where a frame's picture is: where it was, else at the same place within `capture_folder`; None if nowhere."""
-    path = Path(str(thing.get("frame_path", "")))
+def picture_path(obj: bpy.types.Object, capture_folder: str = "") -> Path | None:
+    """Where a frame's picture is: its stored path, else the same one in `capture_folder`; None if neither exists."""
+    path = Path(str(obj.get("frame_path", "")))
     if not path.name:
         return None
     if path.is_file():
         return path
     parts = path.parts
-    places = [Path(capture_folder, *parts[-n:]) for n in range(min(len(parts), 4), 0, -1)] if capture_folder else []
-    return next((place for place in places if place.is_file()), None)
+    candidates = [Path(capture_folder, *parts[-n:]) for n in range(min(len(parts), 4), 0, -1)] if capture_folder else []
+    return next((candidate for candidate in candidates if candidate.is_file()), None)

@@ -1,4 +1,4 @@
-"""Pictures of a scene as files: rendered whole or not at all, two beside each other, every setting put back."""
+"""Pictures of a scene as files: rendered completely or not at all, two side by side, every setting restored."""
 
 import errno
 import os
@@ -22,10 +22,10 @@ from ..refused import refused
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
 """By ending: Blender's name of the format and its depth."""
 CYCLES, EEVEE = "CYCLES", "EEVEE"
-_SLOT = "Scan Relight"
-"""Name of the slot of Blender's Render Result for pictures that only measure something."""
-_SMALL = 64
-"""Pixels of their width."""
+_SLOT_NAME = "Scan Relight"
+"""Name of the slot of Blender's Render Result for pictures that are only measured."""
+_SMALL_WIDTH = 64
+"""Their width in pixels."""
 _RENDER = (
     "engine filepath resolution_x resolution_y resolution_percentage pixel_aspect_x pixel_aspect_y film_transparent "
     "use_border use_file_extension use_compositing use_sequencer use_overwrite use_placeholder"
@@ -36,7 +36,7 @@ _VIEW = ("view_transform", "look", "exposure", "gamma", "use_curve_mapping")
 
 
 def check_format(path: Path | str) -> str:
-    """The ending of a picture's name, in small letters; raises `BadInputError` where we can't write such a one."""
+    """The ending of a picture's name, in lower case; raises `BadInputError` where we can't write that format."""
     ending = Path(path).suffix.lower()
     if ending not in FORMATS:
         raise BadInputError(f"Picture '{path}' has to end in .png, .exr or .jpg.")
@@ -45,37 +45,37 @@ def check_format(path: Path | str) -> str:
 
 @contextmanager
 def settings_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    """Put back a scene's settings of rendering, its camera and its picture format, whatever happens."""
+    """Restore a scene's render settings, camera and image format afterwards, whatever happens."""
     groups = [(scene.render, _RENDER), (scene.render.image_settings, _IMAGE), (scene.view_settings, _VIEW)]
     groups += [(getattr(scene, "cycles", None), _CYCLES), (scene.eevee, ["taa_render_samples"]), (scene, ["camera"])]
-    kept = [(group, name, getattr(group, name)) for group, names in groups for name in names if hasattr(group, name)]
+    saved = [(group, name, getattr(group, name)) for group, names in groups for name in names if hasattr(group, name)]
     try:
         yield
     finally:
-        for group, name, value in kept:
+        for group, name, value in saved:
             setattr(group, name, value)
 
 
 @contextmanager
 def result_kept() -> Iterator[None]:
-    """Within: what is rendered goes into a slot of its own, so that the artist's Render Result stays."""
+    """Within: renders go into a slot of their own, so that the artist's Render Result stays."""
     slots = _render_slots()
-    shown = slots.active_index if slots is not None else 0
+    active_index = slots.active_index if slots is not None else 0
     if slots is not None:
-        if _SLOT not in [slot.name for slot in slots]:
-            slots.new(name=_SLOT)
-        slots.active_index = [slot.name for slot in slots].index(_SLOT)
+        if _SLOT_NAME not in [slot.name for slot in slots]:
+            slots.new(name=_SLOT_NAME)
+        slots.active_index = [slot.name for slot in slots].index(_SLOT_NAME)
     try:
         yield
     finally:
         slots = _render_slots()
-        if slots is not None and shown < len(slots):
-            slots.active_index = shown
+        if slots is not None and active_index < len(slots):
+            slots.active_index = active_index
 
 
 def _render_slots():
     """The slots of the Render Result; None before anything was rendered."""
-    image = next((one for one in bpy.data.images if one.type == "RENDER_RESULT"), None)
+    image = next((item for item in bpy.data.images if item.type == "RENDER_RESULT"), None)
     return image.render_slots if image is not None else None
 
 
@@ -112,7 +112,7 @@ def can_denoise() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
-def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
+def render_to_file(scene: bpy.types.Scene, path: Path | str) -> None:
     """Render to a file: PNG and JPEG as the scene shows it, EXR linear; raises `StorageError`."""
     path = Path(path)
     kind, depth = FORMATS[check_format(path)]
@@ -137,16 +137,16 @@ def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
         prepare(scene, engine, samples)
         render = scene.render
-        render.resolution_y = max(round(_SMALL * render.resolution_y / render.resolution_x), 8)
-        render.resolution_x, render.resolution_percentage = _SMALL, 100
+        render.resolution_y = max(round(_SMALL_WIDTH * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = _SMALL_WIDTH, 100
         if engine == CYCLES:
             scene.cycles.use_denoising = False
-        shoot(scene, Path(folder) / "small.exr")
+        render_to_file(scene, Path(folder) / "small.exr")
         return float(np.median(read_exr(Path(folder) / "small.exr").rgb @ LUMINANCE))
 
 
 def seconds_expected(scene: bpy.types.Scene) -> float:
-    """About how long a picture will take, from two of few samples; 0 where that is not worth asking.
+    """About how long a picture will take, from two of few samples; 0 where that is not worth measuring.
 
     Blender tells Python nothing while it renders: its handler of render statistics waits for Python, which waits for
     the render, and what Cycles writes of its samples is next to nothing without a window.
@@ -154,42 +154,42 @@ def seconds_expected(scene: bpy.types.Scene) -> float:
     if scene.render.engine != CYCLES or scene.cycles.samples < 32:
         return 0.0
     samples, denoising = scene.cycles.samples, scene.cycles.use_denoising
-    few, taken = max(samples // 16, 4), []
+    few_samples, seconds = max(samples // 16, 4), []
     try:
         scene.cycles.use_denoising = False
-        for count in (few, 1):  # the first one loads what the device needs
+        for count in (few_samples, 1):  # the first render also loads the device's kernels
             scene.cycles.samples = count
-            began = time.monotonic()
+            start = time.monotonic()
             bpy.ops.render.render(write_still=False, scene=scene.name)
-            taken.append(time.monotonic() - began)
+            seconds.append(time.monotonic() - start)
     finally:
         scene.cycles.samples, scene.cycles.use_denoising = samples, denoising
-    return taken[1] + (samples - 1) * max(taken[0] - taken[1], 0.0) / (few - 1)
+    return seconds[1] + (samples - 1) * max(seconds[0] - seconds[1], 0.0) / (few_samples - 1)
 
 
 @contextmanager
-def ticking(progress: Progress, expected: float) -> Iterator[None]:
-    """While a picture is rendered within, tell its share by the clock; `expected` seconds, 0: nothing is told."""
-    end, began = threading.Event(), time.monotonic()
+def timed_progress(progress: Progress, expected: float) -> Iterator[None]:
+    """While a picture is rendered within, report progress by the clock; `expected` seconds, 0: no reports."""
+    finished, start = threading.Event(), time.monotonic()
 
-    def tell() -> None:
-        with suppress(InterruptedRun):  # the wish to stop is heard by who rendered, at its end
-            while not end.wait(0.25):
-                progress.update(min((time.monotonic() - began) / expected, 0.97))
+    def report() -> None:
+        with suppress(InterruptedRun):  # a request to stop is handled by the caller, after the render
+            while not finished.wait(0.25):
+                progress.update(min((time.monotonic() - start) / expected, 0.97))
 
-    thread = threading.Thread(target=tell, name="scan relight picture", daemon=True)
+    thread = threading.Thread(target=report, name="scan relight picture", daemon=True)
     if expected > 0:
         thread.start()
     try:
         yield
     finally:
-        end.set()
+        finished.set()
         if expected > 0:
             thread.join()
 
 
 def _is_black(path: Path) -> bool:
-    """Whether a picture holds nothing but zeros; EEVEE without a graphics card gives such a one without a word."""
+    """Whether a picture holds nothing but zeros; EEVEE without a graphics card renders that without an error."""
     if not path.exists():
         return False
     image = bpy.data.images.load(str(path.absolute()))
@@ -201,31 +201,31 @@ def _is_black(path: Path) -> bool:
 
 @contextmanager
 def saving(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that Blender saves a picture to, moved over it; one sentence where that fails."""
+    """A temporary file beside `path` that Blender saves a picture to, moved over it; one sentence where that fails."""
     with refused(f"'{path}' can't be written", "free some space or choose another result folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
-            temporary.touch()  # a folder that can't be written is told before the picture is rendered, and by its name
+            temporary.touch()  # a folder that can't be written fails before the picture is rendered, with its name
             yield temporary
             content = temporary.read_bytes() if temporary.exists() else b""
-            whole = content[-8:-4] == b"IEND" if path.suffix.lower() == ".png" else len(content) > 100
-            if not whole:  # Blender does not always notice a full disk
+            complete = content[-8:-4] == b"IEND" if path.suffix.lower() == ".png" else len(content) > 100
+            if not complete:  # Blender does not always notice a full disk
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def beside(left: Path, right: Path, out: Path) -> None:
-    """Put two pictures of one size beside each other; `out` ends as they do."""
-    images = [bpy.data.images.load(str(Path(path).absolute())) for path in (left, right)]
-    pixels = [image_array(image) for image in images]
+def save_side_by_side(left: Path, right: Path, out: Path) -> None:
+    """Join two pictures of one size side by side; `out` has their file name extension."""
+    inputs = [bpy.data.images.load(str(Path(path).absolute())) for path in (left, right)]
+    pixels = [image_array(item) for item in inputs]
     gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
     joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
     joined[..., 3] = 1.0
     kind = FORMATS[check_format(out)][0]
-    made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0], float_buffer=kind == "OPEN_EXR")
+    image = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0], float_buffer=kind == "OPEN_EXR")
     try:
-        made.pixels.foreach_set(joined.ravel())
+        image.pixels.foreach_set(joined.ravel())
         with saving(Path(out)) as temporary:
-            made.filepath_raw, made.file_format = str(temporary.absolute()), kind
-            made.save()
+            image.filepath_raw, image.file_format = str(temporary.absolute()), kind
+            image.save()
     finally:
-        bpy.data.batch_remove([*images, made])
+        bpy.data.batch_remove([*inputs, image])

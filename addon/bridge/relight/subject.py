@@ -1,4 +1,4 @@
-"""What the camera looks at, as points on the room's surfaces: the things in the middle of its picture, or all of it."""
+"""What the camera looks at, as points on the room's surfaces: objects in the middle of its picture, or all of it."""
 
 import math
 from dataclasses import dataclass
@@ -21,26 +21,26 @@ from ..light.room import (
 )
 from ..marks import OBJECT_ID
 
-_THING = 0.05
-"""Weighted share of the picture from which on a single thing is what the picture is of."""
-_STANDS_OUT = 0.3, 0.1
-"""Metres by which a thing stands out from the walls, and from the floor, if it is more than a part of them."""
+_OBJECT_SHARE = 0.05
+"""Weighted share of the picture from which on a single object is its subject."""
+_SHELL_DEPTH = 0.3, 0.1
+"""Metres by which an object protrudes from the walls, and from the floor, if it is not part of them."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What a light is for.
+    """What a light is aimed at and has to light.
 
     Attributes
     ----------
     target : Vector
-        What it is aimed at, metres.
+        Point that the light is aimed at, metres.
     name : str
-        Of the thing; '' where it is the view as a whole.
+        Of the object; '' where it is the whole view.
     points, normals : (n, 3) float64
-        What else the picture shows, metres.
+        Surface points that the picture shows, metres, and their normals.
     weights : (n,) float64
-        How much each counts; their sum is 1.
+        Weight of each point; their sum is 1.
     radius : float
         Metres around the target that belong to it.
     """
@@ -53,73 +53,73 @@ class Subject:
     radius: float
 
 
-def subject_of(scene: bpy.types.Scene, aim: str, thing: bpy.types.Object | None = None) -> Subject:
-    """What a light that is aimed by `aim` (see `light.room.target_of`) is for; raises `BadInputError` as that."""
-    seen = _seen(scene)
-    if not seen or aim in (CURSOR, OBJECT):
-        target = target_of(scene, aim, thing)
-        name, radius = (thing.name, max(thing.dimensions) / 2) if aim == OBJECT else ("", 0.5)
-        counts = [5.0 if (hit.place - target).length < max(radius, 0.5) else 1.0 for hit in seen]
+def subject_of(scene: bpy.types.Scene, aim: str, obj: bpy.types.Object | None = None) -> Subject:
+    """The subject of a light aimed by `aim`; see `light.room.target_of`, also for the `BadInputError` it raises."""
+    hits = _visible_hits(scene)
+    if not hits or aim in (CURSOR, OBJECT):
+        target = target_of(scene, aim, obj)
+        name, radius = (obj.name, max(obj.dimensions) / 2) if aim == OBJECT else ("", 0.5)
+        counts = [5.0 if (hit.place - target).length < max(radius, 0.5) else 1.0 for hit in hits]
     else:
-        shell, shares = _shell(scene), {"": _THING * sum(seen.values())}
-        for hit, weight in seen.items():
+        shell, shares = _shell(scene), {"": _OBJECT_SHARE * sum(hits.values())}
+        for hit, weight in hits.items():
             if hit.thing.name not in shell:
                 shares[hit.thing.name] = shares.get(hit.thing.name, 0.0) + weight
         name = max(shares, key=shares.get)
-        # A ceiling is seldom what a picture is of.
-        counts = [4.0 if hit.thing.name == name else 0.25 if hit.normal.z < -0.7 else 1.0 for hit in seen]
-        of = {hit: count for hit, count in zip(seen, counts) if not name or hit.thing.name == name}
-        places = np.array([hit.place for hit in of])
-        middle = np.average(places, axis=0, weights=[count * seen[hit] for hit, count in of.items()])
-        beside = np.linalg.norm(places - middle, axis=1)
-        target, radius = Vector(places[beside.argmin()]), float(np.quantile(beside, 0.8))
-    if not seen:
+        # A ceiling is seldom the subject of a picture.
+        counts = [4.0 if hit.thing.name == name else 0.25 if hit.normal.z < -0.7 else 1.0 for hit in hits]
+        counted = {hit: count for hit, count in zip(hits, counts) if not name or hit.thing.name == name}
+        positions = np.array([hit.place for hit in counted])
+        center = np.average(positions, axis=0, weights=[count * hits[hit] for hit, count in counted.items()])
+        distances = np.linalg.norm(positions - center, axis=1)
+        target, radius = Vector(positions[distances.argmin()]), float(np.quantile(distances, 0.8))
+    if not hits:
         return Subject(target, name, np.array([target]), np.array([(0.0, 0.0, 1.0)]), np.ones(1), radius)
-    points, normals = (np.array([getattr(hit, field) for hit in seen]) for field in ("place", "normal"))
-    weights = np.array(counts) * list(seen.values())
+    points, normals = (np.array([getattr(hit, field) for hit in hits]) for field in ("place", "normal"))
+    weights = np.array(counts) * list(hits.values())
     return Subject(target, name, points, normals, weights / weights.sum(), min(max(radius, 0.2), 1.5))
 
 
-def _seen(scene) -> dict[Hit, float]:
-    """What a grid of the picture's rays meets, and how much each counts: the middle more than the rim."""
-    found: dict[Hit, float] = {}
+def _visible_hits(scene) -> dict[Hit, float]:
+    """Hits of a grid of rays through the picture, with weights: the middle counts more than the rim."""
+    weights: dict[Hit, float] = {}
     for x, y in PICTURE if scene.camera is not None else ():
         hit = cast(scene, *picture_ray(scene, x, y))
         if hit is not None and OBJECT_ID in hit.thing:
-            found[hit._replace(place=hit.place.freeze(), normal=hit.normal.freeze())] = math.exp(
+            weights[hit._replace(place=hit.place.freeze(), normal=hit.normal.freeze())] = math.exp(
                 -((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3**2)
             )
-    return found
+    return weights
 
 
 def _shell(scene) -> set[str]:
     """Names of the scanned objects that make up the room itself.
 
-    As wide as most of it, above one's head, or all within a hand's breadth of its walls or its floor, as panels,
-    doors and cupboards in an alcove are.
+    Those as wide as most of it, above head height, or close to its walls or its floor, such as panels, doors and
+    cupboards in an alcove.
     """
-    low, high = (np.array(one) for one in bounds(scene))
+    low, high = (np.array(corner) for corner in bounds(scene))
     size, boxes = high - low, {}
-    for thing in room_objects(scene):
-        corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
-        boxes[thing.name] = corners.min(0), corners.max(0)
-    # What lies behind the walls, as alcoves and panes do, widens the room's bounds: those of walls all around do not.
+    for obj in room_objects(scene):
+        corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+        boxes[obj.name] = corners.min(0), corners.max(0)
+    # Objects behind the walls, such as alcoves and panes, extend the room's bounds; walls all around do not.
     walls = [box for box in boxes.values() if all(box[1] - box[0] > 0.6 * size)] or [(low, high)]
     inner, outer = np.maximum.reduce([box[0] for box in walls]), np.minimum.reduce([box[1] for box in walls])
-    wall, floor = min(_STANDS_OUT[0], 0.1 * min(size[:2])), min(_STANDS_OUT[1], 0.1 * size[2])
+    wall, floor = min(_SHELL_DEPTH[0], 0.1 * min(size[:2])), min(_SHELL_DEPTH[1], 0.1 * size[2])
 
-    def is_part(least: np.ndarray, most: np.ndarray) -> bool:
-        wide, out = sum(most - least > 0.6 * size) > 1, min(*(most - inner)[:2], *(outer - least)[:2])
-        return wide or out < wall or most[2] - low[2] < floor or least[2] > low[2] + 0.85 * size[2]
+    def is_shell(minimum: np.ndarray, maximum: np.ndarray) -> bool:
+        spans, protrusion = sum(maximum - minimum > 0.6 * size) > 1, min(*(maximum - inner)[:2], *(outer - minimum)[:2])
+        return spans or protrusion < wall or maximum[2] - low[2] < floor or minimum[2] > low[2] + 0.85 * size[2]
 
-    return {name for name, box in boxes.items() if is_part(*box)}
+    return {name for name, box in boxes.items() if is_shell(*box)}
 
 
 def side_of(scene: bpy.types.Scene, target: Vector, place: Vector) -> str:
-    """From where a light comes, as who looks through the camera would say it."""
-    forward, way = view_direction(scene), place - target
-    ahead, right = way.dot(forward), way.x * forward.y - way.y * forward.x
-    if way.length and way.z > 0.8 * way.length:
+    """The side that a light comes from, as seen through the camera."""
+    forward, offset = view_direction(scene), place - target
+    ahead, right = offset.dot(forward), offset.x * forward.y - offset.y * forward.x
+    if offset.length and offset.z > 0.8 * offset.length:
         return "above"
     if abs(right) <= 0.35 * math.hypot(ahead, right):
         return "the camera's side" if ahead <= 0 else "behind"

@@ -1,1 +1,1 @@
-"""Result folders: where they go, what they say, their images in an open file, finding them again."""
+"""Result folders: their location, their content, their images in an open file, finding moved ones."""

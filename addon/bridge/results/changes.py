@@ -1,4 +1,4 @@
-"""What a run found of each object beside what the last one found, so that an artist sees what is new."""
+"""Findings of a run for each object compared with those of the last run, so that an artist sees what changed."""
 
 import json
 import math
@@ -14,67 +14,67 @@ from ..marks import CHANGES, LAST_FOUND
 
 ROUGHNESS: Shown[float] = 0.1
 ALBEDO: Shown[float] = 0.05
-"""Differences from which on they can be seen: of Blender's roughness, and of the mean albedo."""
+"""Visible differences: of Blender's roughness, and of the mean albedo."""
 
 
-def found(folder: Path) -> dict[str, dict[str, Any]]:
-    """What a result says of each object, by `object_id`; empty where it can't be read."""
+def read_findings(folder: Path) -> dict[str, dict[str, Any]]:
+    """A result's findings for each object, by `object_id`; empty where it can't be read."""
     try:
-        listed = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
-        return {str(one["object_id"]): _facts(renamed(one)) for one in listed}
+        entries = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
+        return {str(entry["object_id"]): _finding(renamed(entry)) for entry in entries}
     except DAMAGE:
         return {}
 
 
-def _facts(one: dict) -> dict[str, Any]:
-    albedo = (one.get("evidence") or {}).get("albedo")
-    alpha = one.get("alpha")
+def _finding(entry: dict) -> dict[str, Any]:
+    albedo = (entry.get("evidence") or {}).get("albedo")
+    alpha = entry.get("alpha")
     return {
-        "name": one.get("name") or f"{one.get('class_name') or 'Object'} {one['object_id']}",
-        "model": one["model"],
+        "name": entry.get("name") or f"{entry.get('class_name') or 'Object'} {entry['object_id']}",
+        "model": entry["model"],
         "roughness": None if alpha is None else round(math.sqrt(max(alpha, 0.0)), 3),
         "albedo": None if albedo is None else round(sum(albedo) / 3, 3),
     }
 
 
-def keep(top: bpy.types.Collection, now: dict[str, dict[str, Any]]) -> None:
-    """Keep what was found with the room."""
-    top[LAST_FOUND] = json.dumps(now)
+def store_findings(collection: bpy.types.Collection, findings: dict[str, dict[str, Any]]) -> None:
+    """Store findings in the room's collection."""
+    collection[LAST_FOUND] = json.dumps(findings)
 
 
-def compare(before: dict[str, dict[str, Any]], now: dict[str, dict[str, Any]]) -> tuple[dict[str, Any], ...]:
-    """The objects that differ notably, the greatest differences first."""
-    told = []
-    for key, new in now.items():
+def compare(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> tuple[dict[str, Any], ...]:
+    """The objects with visible differences, the greatest first."""
+    changes = []
+    for key, new in after.items():
         old = before.get(key)
         if old is None:
             continue
-        rank, texts = 0.0, []
+        rank, sentences = 0.0, []
         if old["model"] != new["model"]:
-            rank, texts = 10.0, [f"{old['model']}, now {new['model']}"]
-        for name, least in (("roughness", ROUGHNESS), ("albedo", ALBEDO)):
-            if None not in (old[name], new[name]) and abs(new[name] - old[name]) >= least:
-                rank += abs(new[name] - old[name]) / least
-                texts.append(f"{name} {old[name]:.2f}, now {new[name]:.2f}")
-        if texts:
-            told.append(
-                (-rank, {"object_id": int(key), "name": new["name"], "text": f"{new['name']}: {'; '.join(texts)}."})
+            rank, sentences = 10.0, [f"{old['model']}, now {new['model']}"]
+        for name, threshold in (("roughness", ROUGHNESS), ("albedo", ALBEDO)):
+            if None not in (old[name], new[name]) and abs(new[name] - old[name]) >= threshold:
+                rank += abs(new[name] - old[name]) / threshold
+                sentences.append(f"{name} {old[name]:.2f}, now {new[name]:.2f}")
+        if sentences:
+            changes.append(
+                (-rank, {"object_id": int(key), "name": new["name"], "text": f"{new['name']}: {'; '.join(sentences)}."})
             )
-    return tuple(one for _, one in sorted(told, key=lambda pair: pair[0]))
+    return tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))
 
 
-def kept(top: bpy.types.Collection) -> dict[str, dict[str, Any]]:
-    """What the room's last run found; empty where it had none."""
-    return json.loads(top.get(LAST_FOUND, "{}"))
+def stored_findings(collection: bpy.types.Collection) -> dict[str, dict[str, Any]]:
+    """The findings of the room's last run; empty where it had none."""
+    return json.loads(collection.get(LAST_FOUND, "{}"))
 
 
-def show(scene: bpy.types.Scene, changes: tuple[dict[str, Any], ...]) -> None:
-    """Keep the differences with a scene, for its panel."""
+def store_changes(scene: bpy.types.Scene, changes: tuple[dict[str, Any], ...]) -> None:
+    """Store the differences in a scene, for its panel."""
     scene[CHANGES] = json.dumps(changes)
 
 
-def shown(scene: bpy.types.Scene) -> list[dict[str, Any]]:
-    """The differences that are kept with a scene."""
+def stored_changes(scene: bpy.types.Scene) -> list[dict[str, Any]]:
+    """The differences that are stored in a scene."""
     try:
         return json.loads(scene.get(CHANGES, "[]"))
     except ValueError:

@@ -1,6 +1,6 @@
-"""What result folders say, and which of a scene's objects each is about: an object and a folder belong together by run.
+"""Contents of result folders, and the scene's objects of each: an object and a folder are matched by run.
 
-An object's number alone says nothing: every room counts from 0, and a folder may hold another run than it did.
+An object's number alone is ambiguous: every room counts from 0, and a folder may have been overwritten by another run.
 """
 
 from collections.abc import Iterable
@@ -16,9 +16,9 @@ from ...core.io.folder import MATERIALS, REPORT
 from ..data.materials import MODEL
 from ..marks import OBJECT_ID, RESULT, RUN
 
-FITS, EARLIER, UNTOLD, GONE = "FITS", "EARLIER", "UNTOLD", "GONE"
-"""How an object stands to the result that it came from: it is of the run that lies there; of another one; it can't be
-told, as the object or the folder is older than runs' keys; or there is no result any more."""
+FITS, EARLIER, UNKNOWN, GONE = "FITS", "EARLIER", "UNTOLD", "GONE"
+"""State of an object relative to its result: it is of the run in the folder; of another one; unknown, as the object or
+the folder is older than runs' keys; or the result no longer exists."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Result:
     run : str
         Key of the run; '' where it is older than such keys.
     layout : str
-        Key of how its images are laid out; '' likewise.
+        Key of the layout of its images; '' likewise.
     objects : dict of int to dict
         Entries of materials.json by `object_id`.
     stages : dict of str to dict
@@ -44,75 +44,79 @@ class Result:
     stages: dict[str, dict[str, Any]]
 
 
-_read: dict[Path, tuple[tuple, Result]] = {}
+_cache: dict[Path, tuple[tuple, Result]] = {}
 
 
 def read(folder: Path) -> Result | None:
-    """What a result folder says, read again when a file has changed; None where there is neither file."""
+    """A result folder's content, read again when a file has changed; None where there is neither file."""
     stamp = tuple(_stamp(folder / name) for name in (MATERIALS, REPORT))
     if not any(stamp):
         return None
-    if folder not in _read or _read[folder][0] != stamp:
-        if len(_read) > 8:
-            _read.clear()
-        report, told = json_if_sound(folder / REPORT), json_if_sound(folder / MATERIALS)
-        listed = [one for one in _of_kind(told, "objects", list) if isinstance(one, dict) and "object_id" in one]
+    if folder not in _cache or _cache[folder][0] != stamp:
+        if len(_cache) > 8:
+            _cache.clear()
+        report, materials = json_if_sound(folder / REPORT), json_if_sound(folder / MATERIALS)
+        entries = [
+            entry
+            for entry in _value_of_type(materials, "objects", list)
+            if isinstance(entry, dict) and "object_id" in entry
+        ]
         result = Result(
             folder,
-            _of_kind(told, "run", str),
-            _of_kind(told, "layout", str),
-            {one["object_id"]: renamed(one) for one in listed},
-            _of_kind(report, "stages", dict),
+            _value_of_type(materials, "run", str),
+            _value_of_type(materials, "layout", str),
+            {entry["object_id"]: renamed(entry) for entry in entries},
+            _value_of_type(report, "stages", dict),
         )
-        _read[folder] = stamp, result
-    return _read[folder][1]
+        _cache[folder] = stamp, result
+    return _cache[folder][1]
 
 
-def _of_kind(told: dict[str, Any], key: str, kind: type):
-    """What is told under `key`; nothing of its kind where that is absent or of another."""
-    return told[key] if isinstance(told.get(key), kind) else kind()
+def _value_of_type(document: dict[str, Any], key: str, kind: type):
+    """The value of `key`; an empty `kind` where that is absent or of another type."""
+    return document[key] if isinstance(document.get(key), kind) else kind()
 
 
 def forget() -> None:
-    """Read everything again."""
-    _read.clear()
+    """Clear the cache."""
+    _cache.clear()
 
 
-def standings(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, tuple[str, Result | None]]:
-    """How each recovered object stands to its result (`FITS` and its neighbours), and that result."""
-    found, folders = {}, {}
-    for thing in things:
-        if thing.type != "MESH" or OBJECT_ID not in thing:
+def result_states(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, tuple[str, Result | None]]:
+    """State of each recovered object (`FITS` and the others), and its result."""
+    states, folders = {}, {}
+    for obj in objects:
+        if obj.type != "MESH" or OBJECT_ID not in obj:
             continue
-        told, run = thing.get(RESULT), thing.get(RUN)
-        if not told:
-            if any(slot.material is not None and MODEL in slot.material for slot in thing.material_slots):
-                found[thing] = UNTOLD, None
+        folder_name, run = obj.get(RESULT), obj.get(RUN)
+        if not folder_name:
+            if any(slot.material is not None and MODEL in slot.material for slot in obj.material_slots):
+                states[obj] = UNKNOWN, None
             continue
-        if told not in folders:
-            folders[told] = read(Path(told))
-        result = folders[told]
+        if folder_name not in folders:
+            folders[folder_name] = read(Path(folder_name))
+        result = folders[folder_name]
         if result is None:
             state = GONE
         elif not run or not result.run:
-            state = UNTOLD
+            state = UNKNOWN
         else:
             state = FITS if run == result.run else EARLIER
-        found[thing] = state, result
-    return found
+        states[obj] = state, result
+    return states
 
 
-def standing(thing: bpy.types.Object | None) -> tuple[str, Result | None]:
-    """`standings` of one object; ('', None) for what nothing was recovered of."""
-    return standings([thing]).get(thing, ("", None)) if thing is not None else ("", None)
+def result_state(obj: bpy.types.Object | None) -> tuple[str, Result | None]:
+    """`result_states` of one object; ('', None) for one that was not recovered."""
+    return result_states([obj]).get(obj, ("", None)) if obj is not None else ("", None)
 
 
-def rows(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str, Any]]:
-    """The entry of materials.json of each object whose run lies in its folder."""
+def rows(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str, Any]]:
+    """The entry of materials.json of each object whose run is the one in its folder."""
     return {
-        thing: result.objects[thing[OBJECT_ID]]
-        for thing, (state, result) in standings(things).items()
-        if state == FITS and thing[OBJECT_ID] in result.objects
+        obj: result.objects[obj[OBJECT_ID]]
+        for obj, (state, result) in result_states(objects).items()
+        if state == FITS and obj[OBJECT_ID] in result.objects
     }
 
 

@@ -1,6 +1,6 @@
-"""Results that were moved: what an open file misses, and pointing all of it to where the result lies now.
+"""Results that were moved: what is missing from the open file, and redirecting all of it to the new folder.
 
-A result is known by its run's key, never by its name alone.
+A result is identified by its run's key, never by its name alone.
 """
 
 import time
@@ -19,31 +19,31 @@ from ...core.results.room_file import MATERIALS, layout_of, run_of
 from ..data.images import relative_to, result_of
 from ..marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from . import file
-from .home import shown
-from .images import KEPT, is_there, kept_path, of_results, path_of
+from .home import display_path
+from .images import KEPT, is_there, kept_path, path_of, result_images
 
-NAMED: Shown[int] = 3
-"""Images that a sentence names before it counts the rest."""
-LOOKED_AT: Limit[int] = 200
-"""Sub-folders of a chosen folder that are looked at."""
-FRESH: Shown[float] = 2.0
-"""Seconds for which what is missing is not looked up again: panels ask at each picture."""
+MAX_NAMED: Shown[int] = 3
+"""Images that a sentence names; the others are counted."""
+MAX_SUBFOLDERS: Limit[int] = 200
+"""Sub-folders of a chosen folder that are searched."""
+CACHE_SECONDS: Shown[float] = 2.0
+"""Seconds for which the missing files are cached: panels ask at each redraw."""
 
 
 @dataclass(frozen=True)
 class Missing:
-    """What a file misses of one result.
+    """What is missing of one result.
 
     Attributes
     ----------
     folder : Path
-        Where the result lay.
+        Former folder of the result.
     run : str
-        The run's key; '' where nothing in the file tells it.
+        The run's key; '' where the file does not have it.
     images : tuple of str
-        Names of the image files that can't be shown.
+        Names of the missing image files.
     gone : bool
-        The folder itself is not there, or holds no result any more.
+        The folder itself is missing, or is no result any more.
     """
 
     folder: Path
@@ -53,168 +53,181 @@ class Missing:
 
     @property
     def sentence(self) -> str:
-        """What to tell the artist."""
-        where = shown(self.folder)
+        """The message for the artist."""
+        path = display_path(self.folder)
         if self.gone:
-            what = "its pictures can't be shown" if self.images else "what was found of each object can't be listed"
-            return f"The result folder '{where}' is gone: {what}."
-        names, count = ", ".join(f"'{name}'" for name in self.images[:NAMED]), len(self.images)
-        more = f" and {count - NAMED} more" if count > NAMED else ""
+            consequence = (
+                "its pictures can't be shown" if self.images else "what was found of each object can't be listed"
+            )
+            return f"The result folder '{path}' is gone: {consequence}."
+        names, count = ", ".join(f"'{name}'" for name in self.images[:MAX_NAMED]), len(self.images)
+        omitted = f" and {count - MAX_NAMED} more" if count > MAX_NAMED else ""
         return (
-            f"{names}{more} {'are' if count > 1 else 'is'} missing in '{where}' and can't be shown; find the "
+            f"{names}{omitted} {'are' if count > 1 else 'is'} missing in '{path}' and can't be shown; find the "
             "result or run again."
         )
 
 
-_known: tuple[float, list[Missing], list[Path]] = -FRESH, [], []
+_cache: tuple[float, list[Missing], list[Path]] = -CACHE_SECONDS, [], []
 
 
 def forget() -> None:
-    """Look up again what is missing."""
-    global _known
-    _known = (-FRESH, *_known[1:])
+    """Clear the cache."""
+    global _cache
+    _cache = (-CACHE_SECONDS, *_cache[1:])
 
 
-def known() -> tuple[list[Missing], list[Path]]:
-    """`missing` and `overtaken`, looked up every `FRESH` seconds at most."""
-    global _known
-    looked, before, _ = _known
-    if time.monotonic() - looked >= FRESH:
-        _known = time.monotonic(), missing(), overtaken()
-        left = {one.folder for one in _known[1]}
-        for one in before:
-            if one.folder not in left and not bpy.app.background:  # put back by hand; not now: a panel may be drawing
-                bpy.app.timers.register(partial(reload, one.folder))
-    return _known[1:]
+def cached_state() -> tuple[list[Missing], list[Path]]:
+    """`missing` and `outdated`, computed every `CACHE_SECONDS` at most."""
+    global _cache
+    checked_at, missing_before, _ = _cache
+    if time.monotonic() - checked_at >= CACHE_SECONDS:
+        _cache = time.monotonic(), missing(), outdated()
+        still_missing = {entry.folder for entry in _cache[1]}
+        for entry in missing_before:
+            # Restored by hand; reloaded later, as a panel may be drawing.
+            if entry.folder not in still_missing and not bpy.app.background:
+                bpy.app.timers.register(partial(reload, entry.folder))
+    return _cache[1:]
 
 
-def overtaken() -> list[Path]:
-    """Results that were recovered anew with their images laid out otherwise than the open file's objects ask for."""
-    return sorted({result_of(Path(one[IMAGE])) for one in _overtaken()})
+def outdated() -> list[Path]:
+    """Results that were recovered again with another layout of their images than the open file's objects have."""
+    return sorted({result_of(Path(image[IMAGE])) for image in _outdated_images()})
 
 
-def _overtaken() -> list[bpy.types.Image]:
-    """Images that show a picture of another layout than theirs."""
-    found = []
-    for one in of_results():
-        source = Path(one[IMAGE])
-        if LAYOUT in one and not one.packed_file and path_of(one) == source:
+def _outdated_images() -> list[bpy.types.Image]:
+    """Images whose file has another layout than theirs."""
+    outdated_images = []
+    for image in result_images():
+        source = Path(image[IMAGE])
+        if LAYOUT in image and not image.packed_file and path_of(image) == source:
             result = file.read(result_of(source))
-            if result is not None and result.layout not in ("", one[LAYOUT]):
-                found.append(one)
-    return found
+            if result is not None and result.layout not in ("", image[LAYOUT]):
+                outdated_images.append(image)
+    return outdated_images
 
 
 def reload(folder: Path) -> None:
-    """Read those images of a result again that could not be read before."""
-    for one in of_results():
-        if Path(one[IMAGE]).is_relative_to(folder) and not one.packed_file and not one.has_data:
-            one.reload()
+    """Reload the images of a result that could not be read before."""
+    for image in result_images():
+        if Path(image[IMAGE]).is_relative_to(folder) and not image.packed_file and not image.has_data:
+            image.reload()
 
 
 def missing() -> list[Missing]:
-    """What the open file misses of the results that it was made from."""
+    """What is missing of the open file's results."""
     runs: dict[Path, set[str]] = {}
     for owner in _owners():
         runs.setdefault(Path(owner[RESULT]), set()).add(owner.get(RUN, ""))
-    lost: dict[Path, list[str]] = {}
-    for one in of_results():
-        source = Path(one[IMAGE])
-        if not one.packed_file and not is_there(path_of(one)):
+    lost_images: dict[Path, list[str]] = {}
+    for image in result_images():
+        source = Path(image[IMAGE])
+        if not image.packed_file and not is_there(path_of(image)):
             folder = next((folder for folder in runs if source.is_relative_to(folder)), source.parent)
-            lost.setdefault(folder, []).append(source.name)
-    found = []
-    for folder in sorted({*runs, *lost}):
+            lost_images.setdefault(folder, []).append(source.name)
+    results = []
+    for folder in sorted({*runs, *lost_images}):
         gone = not (folder / MATERIALS).is_file()
-        if gone or folder in lost:
-            known = runs.get(folder, set()) - {""}
-            found.append(
-                Missing(folder, known.pop() if len(known) == 1 else "", tuple(sorted(lost.get(folder, ()))), gone)
+        if gone or folder in lost_images:
+            known_runs = runs.get(folder, set()) - {""}
+            results.append(
+                Missing(
+                    folder,
+                    known_runs.pop() if len(known_runs) == 1 else "",
+                    tuple(sorted(lost_images.get(folder, ()))),
+                    gone,
+                )
             )
-    return found
+    return results
 
 
 def search(home: Path) -> list[str]:
-    """Look for what is missing where it most likely is, and point the open file there; a sentence on each find."""
-    told = []
-    for image in _overtaken():
-        kept = kept_path(Path(image[IMAGE]), image[LAYOUT])
-        if is_there(kept):
-            _show(image, kept)
-    for one in missing():
-        if not one.gone:
-            count = repoint(one.folder, one.folder)
+    """Search likely folders for missing results and redirect the open file; a sentence on each one found."""
+    messages = []
+    for image in _outdated_images():
+        path = kept_path(Path(image[IMAGE]), image[LAYOUT])
+        if is_there(path):
+            _set_path(image, path)
+    for lost in missing():
+        if not lost.gone:
+            count = repoint(lost.folder, lost.folder)
             if count:
-                told.append(
+                messages.append(
                     f"{count} picture{'s' * (count > 1)} {'are' if count > 1 else 'is'} shown from "
-                    f"'{shown(one.folder)}', as the file's own {'are' if count > 1 else 'is'} gone; save the "
+                    f"'{display_path(lost.folder)}', as the file's own {'are' if count > 1 else 'is'} gone; save the "
                     "file to keep it so."
                 )
             continue
-        beside = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
-        places = [
-            *beside,
-            *(folder / part / one.folder.name for folder in beside for part in ("", BESIDE)),
-            home / one.folder.name,
+        file_folders = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
+        candidates = [
+            *file_folders,
+            *(folder / part / lost.folder.name for folder in file_folders for part in ("", BESIDE)),
+            home / lost.folder.name,
         ]
-        new = next((place for place in places if one.run and run_of(place) == one.run or _keeps(place, one)), None)
+        new = next(
+            (place for place in candidates if lost.run and run_of(place) == lost.run or _keeps_images(place, lost)),
+            None,
+        )
         if new is not None:
-            repoint(one.folder, new)
-            told.append(
-                f"The result '{one.folder.name}' was moved and is found again in '{shown(new)}'; save the file "
+            repoint(lost.folder, new)
+            messages.append(
+                f"The result '{lost.folder.name}' was moved and is found again in '{display_path(new)}'; save the file "
                 "to keep it so."
             )
     forget()
-    return told
+    return messages
 
 
-def find(one: Missing, chosen: Path) -> Path:
-    """The missing result in a chosen folder, or one level below or above; raises `BadInputError` where it isn't."""
+def find(lost: Missing, chosen: Path) -> Path:
+    """The missing result in a chosen folder, or one level below or above; raises `BadInputError` if not found."""
     try:
-        below = sorted(part for part in chosen.iterdir() if part.is_dir())[:LOOKED_AT]
+        subfolders = sorted(part for part in chosen.iterdir() if part.is_dir())[:MAX_SUBFOLDERS]
     except OSError as error:
         raise BadInputError(f"'{chosen}' can't be opened ({error.strerror or error}); choose a folder.") from error
-    results = [place for place in (chosen, *below, chosen.parent) if (place / MATERIALS).is_file()]
+    results = [place for place in (chosen, *subfolders, chosen.parent) if (place / MATERIALS).is_file()]
     for place in results:
-        if ((run_of(place) == one.run) if one.run else _holds(place, one.folder)) or _keeps(place, one):
+        if ((run_of(place) == lost.run) if lost.run else _may_be_result(place, lost.folder)) or _keeps_images(
+            place, lost
+        ):
             return place
     if not results:
         raise BadInputError(
             f"'{chosen}' is no result folder ('{MATERIALS}' is missing); choose the one that the run wrote."
         )
     raise BadInputError(
-        f"'{results[0]}' holds another run than '{one.folder.name}' did; choose that one's folder, "
+        f"'{results[0]}' holds another run than '{lost.folder.name}' did; choose that one's folder, "
         "or run again and bring in the new one."
     )
 
 
 def repoint(old: Path, new: Path) -> int:
-    """Point images, objects and rooms of the open file from a result folder to where it is now.
+    """Redirect images, objects and rooms of the open file from a result folder to its new location.
 
-    Images that can be shown from elsewhere (packed, or beside the file) stay as they are.
+    Images that have another source (packed, or beside the file) stay as they are.
 
     Returns
     -------
     int
-        How many images are shown from `new`.
+        How many images now refer to `new`.
     """
     count = 0
-    for one in of_results():
-        source = Path(one[IMAGE])
+    for image in result_images():
+        source = Path(image[IMAGE])
         if not source.is_relative_to(old):
             continue
-        path = path_of(one)
-        there = new / source.relative_to(old)
-        one[IMAGE] = str(there)
+        path = path_of(image)
+        new_path = new / source.relative_to(old)
+        image[IMAGE] = str(new_path)
         if path.is_relative_to(old / KEPT) and is_there(new / path.relative_to(old)):
-            there = new / path.relative_to(old)
-        elif LAYOUT in one and layout_of(new) not in ("", one[LAYOUT]):
-            continue  # a picture that is missing is better than a wrong one
-        if one.packed_file or not is_there(there) or (is_there(path) and not path.is_relative_to(old)):
+            new_path = new / path.relative_to(old)
+        elif LAYOUT in image and layout_of(new) not in ("", image[LAYOUT]):
+            continue  # a missing picture is better than a wrong one
+        if image.packed_file or not is_there(new_path) or (is_there(path) and not path.is_relative_to(old)):
             continue
         if old == new and is_there(path):
             continue
-        _show(one, there)
+        _set_path(image, new_path)
         count += 1
     for owner in _owners():
         if Path(owner[RESULT]) == old:
@@ -224,7 +237,7 @@ def repoint(old: Path, new: Path) -> int:
     return count
 
 
-def _show(image: bpy.types.Image, path: Path) -> None:
+def _set_path(image: bpy.types.Image, path: Path) -> None:
     image.filepath = str(path)
     if bpy.data.filepath:
         relative_to(image, Path(bpy.data.filepath).parent)
@@ -233,23 +246,26 @@ def _show(image: bpy.types.Image, path: Path) -> None:
 
 def _owners() -> Iterable[bpy.types.ID]:
     return [
-        one for kind in (bpy.data.objects, bpy.data.collections) for one in kind if one.get(RESULT) and not one.library
+        owner
+        for data_blocks in (bpy.data.objects, bpy.data.collections)
+        for owner in data_blocks
+        if owner.get(RESULT) and not owner.library
     ]
 
 
-def _keeps(place: Path, one: Missing) -> bool:
-    """Whether a folder keeps the very images that an open file misses, whatever run it holds now."""
-    kept = [path_of(image) for image in of_results()]
-    kept = [path.relative_to(one.folder) for path in kept if path.is_relative_to(one.folder / KEPT)]
-    return bool(kept) and all(is_there(place / path) for path in kept)
+def _keeps_images(folder: Path, lost: Missing) -> bool:
+    """Whether a folder's kept images include all that the open file is missing, whatever its current run."""
+    paths = [path_of(image) for image in result_images()]
+    paths = [path.relative_to(lost.folder) for path in paths if path.is_relative_to(lost.folder / KEPT)]
+    return bool(paths) and all(is_there(folder / path) for path in paths)
 
 
-def _holds(place: Path, folder: Path) -> bool:
-    """Whether a result whose run nobody can tell may be that of `folder`: it has all of its objects."""
+def _may_be_result(place: Path, folder: Path) -> bool:
+    """Whether a result of unknown run may be that of `folder`: it has all of its objects."""
     result = file.read(place)
-    wanted = set()
-    for one in bpy.data.objects:
+    object_ids = set()
+    for obj in bpy.data.objects:
         with suppress(TypeError):
-            if Path(one.get(RESULT, "")) == folder:
-                wanted.add(one.get(OBJECT_ID))
-    return result is not None and not result.run and wanted <= set(result.objects)
+            if Path(obj.get(RESULT, "")) == folder:
+                object_ids.add(obj.get(OBJECT_ID))
+    return result is not None and not result.run and object_ids <= set(result.objects)

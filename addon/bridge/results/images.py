@@ -21,7 +21,7 @@ from ..scene.write import ALBEDO, BASE_COLOR, SCENE_FILES, SHADING
 RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 """Refer to the result folder; copy into a folder beside the saved .blend; pack into it."""
 KEPT = "kept"
-"""Folder of a result with the images, by layout, that saved files refer to."""
+"""Sub-folder of a result with the images, by layout, that saved .blend files refer to."""
 COLOUR_SPACES = {
     BASE_COLOR: RADIANCE,
     ALBEDO: RADIANCE,
@@ -35,58 +35,58 @@ NEVER_SAVED = "Images can't go beside a file that was never saved; save it first
 BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
 
-def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
-    """Load the baked images (`BAKED`), in place of an earlier call's; returns the one that Base Color shows.
+def load_baked(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
+    """Load the baked images (`BAKED`), replacing those of an earlier call; returns the one for Base Color.
 
     Raises
     ------
     BadInputError
-        An image is damaged, or `FOLDER` is wished for and the file was never saved.
+        An image is damaged, or `where` is `FOLDER` and the file was never saved.
     StorageError
         They can't be copied.
     """
     folder = Path(folder).absolute()
-    found = {name: image(folder, name, where) for name in BAKED if (folder / name).exists()}
-    return found.get(BASE_COLOR)
+    images = {name: image(folder, name, where) for name in BAKED if (folder / name).exists()}
+    return images.get(BASE_COLOR)
 
 
 def image(
     folder: Path | str, name: str, where: str = RESULT, keep: bool = True, share: bool = False
 ) -> bpy.types.Image:
-    """One image of a result folder in its content's colour space; `share`: one that is there already, read again."""
+    """One image of a result folder in its content's colour space; `share`: reuse and reload an existing one."""
     source = Path(folder).absolute() / name
-    earlier = [one for one in bpy.data.images if share and one.get(IMAGE) == str(source) and not one.library]
-    if earlier:
-        if not earlier[0].packed_file:
-            earlier[0].reload()
-        return earlier[0]
+    existing = [item for item in bpy.data.images if share and item.get(IMAGE) == str(source) and not item.library]
+    if existing:
+        if not existing[0].packed_file:
+            existing[0].reload()
+        return existing[0]
     loaded = load_image(source, image_name(capture_name(source.parent), name), COLOUR_SPACES[name], keep=keep)
     settle([loaded], where)
     return loaded
 
 
 def drop_unused(folders: Iterable[str]) -> None:
-    """Remove the images of result folders other than `folders` that nothing shows."""
-    for one in list(bpy.data.images):
-        source = one.get(IMAGE)
-        if source and str(Path(source).parent) not in folders and one.users == int(one.use_fake_user):
-            bpy.data.images.remove(one)
+    """Remove the images of result folders other than `folders` that nothing uses."""
+    for image in list(bpy.data.images):
+        source = image.get(IMAGE)
+        if source and str(Path(source).parent) not in folders and image.users == int(image.use_fake_user):
+            bpy.data.images.remove(image)
 
 
 def check(where: str) -> None:
-    """Raise `BadInputError` where images can't go `where` in the open file: best asked before a run, not after it."""
+    """Raise `BadInputError` where images can't go `where` in the open file; check before a run, not after it."""
     if where == FOLDER and not bpy.data.filepath:
         raise BadInputError(NEVER_SAVED)
 
 
 def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
-    """Images that are in the file already go where the artist wants them.
+    """Store images of the open file where the artist wants them.
 
     Parameters
     ----------
     images : iterable of bpy.types.Image
-        Of result folders: those without a file of their own, and linked ones, are passed over. An earlier image of the
-        same file gives its place and its name to the new one, and goes.
+        Of result folders: those without a file of their own, and linked ones, are skipped. The new image takes users
+        and name of an earlier one of the same file, which is removed.
     where : str
         `RESULT`: refer to the result folder, relative to the open file where it was saved; `FOLDER`: copy beside the
         open file; `PACK`: into it.
@@ -94,65 +94,65 @@ def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
     Raises
     ------
     BadInputError
-        `FOLDER` is wished for and the file was never saved, or an image's file is gone.
+        `where` is `FOLDER` and the file was never saved, or an image's file is missing.
     StorageError
         They can't be copied.
     """
     check(where)
-    places = {}
-    for one in {one.session_uid: one for one in images}.values():
-        if one.library or one.source not in ("FILE", "TILED"):
+    targets = {}
+    for image in {image.session_uid: image for image in images}.values():
+        if image.library or image.source not in ("FILE", "TILED"):
             continue
-        source = Path(one.get(IMAGE) or bpy.path.abspath(one.filepath))
-        one[IMAGE] = str(source)
-        if not one.packed_file and not is_there(source):
+        source = Path(image.get(IMAGE) or bpy.path.abspath(image.filepath))
+        image[IMAGE] = str(source)
+        if not image.packed_file and not is_there(source):
             raise BadInputError(f"'{source}' is missing; run the recovery again to its end.")
-        places[one.session_uid] = one, source
-    for one, source in places.values():
-        if not one.packed_file:
-            one.filepath = str(_beside(source) if where == FOLDER else source)
-    gone = set()  # what can fail is done: from here on images give way to others
-    for number, (one, source) in places.items():
-        if number in gone:
+        targets[image.session_uid] = image, source
+    for image, source in targets.values():
+        if not image.packed_file:
+            image.filepath = str(_copy_beside_file(source) if where == FOLDER else source)
+    removed = set()  # nothing below can fail: from here on images are replaced
+    for uid, (image, source) in targets.items():
+        if uid in removed:
             continue
-        same = [other for other in bpy.data.images if other.get(IMAGE) == str(source) and not other.library]
-        for earlier in [other for other in same if other != one]:
-            gone.add(earlier.session_uid)
-            replace(earlier, one)
-        if one.packed_file:
+        same_file = [other for other in bpy.data.images if other.get(IMAGE) == str(source) and not other.library]
+        for earlier in [other for other in same_file if other != image]:
+            removed.add(earlier.session_uid)
+            replace(earlier, image)
+        if image.packed_file:
             continue
         if where == PACK:
-            one.pack()
+            image.pack()
         elif bpy.data.filepath:
-            relative_to(one, Path(bpy.data.filepath).parent)
+            relative_to(image, Path(bpy.data.filepath).parent)
 
 
-def replace(earlier: bpy.types.Image, one: bpy.types.Image) -> None:
-    """Let `one` stand wherever `earlier` did, under its name; `earlier` is removed."""
-    label, kept = earlier.name, earlier.use_fake_user
-    earlier.user_remap(one)
+def replace(earlier: bpy.types.Image, new: bpy.types.Image) -> None:
+    """Replace `earlier` by `new` everywhere, under its name; `earlier` is removed."""
+    name, fake_user = earlier.name, earlier.use_fake_user
+    earlier.user_remap(new)
     bpy.data.images.remove(earlier)
-    one.name, one.use_fake_user = label, one.use_fake_user or kept
+    new.name, new.use_fake_user = name, new.use_fake_user or fake_user
 
 
 def keep(saved: Path) -> None:
-    """Let the open file, before it is saved, refer to images that no run overwrites which lays its images out anew.
+    """Before saving, make the open file refer to images that a later run with another layout does not overwrite.
 
-    They are further names (hard links) of the result's own files, so they take no space until a run writes those anew;
-    copies where the disk knows no such links. What can't be kept stays referred to as it was.
+    They are hard links to the result's own files, so they take no space until a run rewrites those; copies where the
+    file system has no hard links. An image for which that fails keeps its path.
 
     Parameters
     ----------
     saved : Path
-        Where the file will be. A result's own scene.blend is overwritten along with its images and refers to those.
+        Path of the file. A result's own scene.blend is overwritten together with its images and refers to those.
     """
-    for one in of_results():
-        source = Path(one[IMAGE])
+    for image in result_images():
+        source = Path(image[IMAGE])
         folder = result_of(source)
-        shown = path_of(one)
-        if one.packed_file or shown != source or saved.parent == folder and saved.name in SCENE_FILES:
+        path = path_of(image)
+        if image.packed_file or path != source or saved.parent == folder and saved.name in SCENE_FILES:
             continue
-        layout = one.get(LAYOUT)
+        layout = image.get(LAYOUT)
         if not layout or layout_of(folder) != layout:
             continue
         target = kept_path(source, layout)
@@ -161,12 +161,12 @@ def keep(saved: Path) -> None:
                 link(part, target.parent / part.name)
         except StorageError:
             continue
-        relative = one.filepath.startswith("//")
-        one.filepath_raw = bpy.path.relpath(str(target)) if relative else str(target)  # the picture is the same
+        relative = image.filepath.startswith("//")
+        image.filepath_raw = bpy.path.relpath(str(target)) if relative else str(target)  # the pixels are the same
 
 
 def link(source: Path, target: Path) -> None:
-    """Make `target` a further name of a file, or a copy where that can't be; raises `StorageError`."""
+    """Make `target` a hard link to a file, or a copy where that fails; raises `StorageError`."""
     if target.exists() and filecmp.cmp(source, target):
         return
     with refused(f"'{target.parent}' can't be made", "check its rights"):
@@ -179,18 +179,22 @@ def link(source: Path, target: Path) -> None:
 
 
 def kept_path(source: Path, layout: str) -> Path:
-    """Where an image of a result folder is kept for saved files."""
+    """Path at which an image of a result folder is kept for saved files."""
     folder = result_of(source)
     return folder / KEPT / layout / source.relative_to(folder)
 
 
-def of_results() -> list[bpy.types.Image]:
-    """The open file's own images that came from a result."""
-    return [one for one in bpy.data.images if one.get(IMAGE) and not one.library and one.source in ("FILE", "TILED")]
+def result_images() -> list[bpy.types.Image]:
+    """The open file's local images that came from a result."""
+    return [
+        image
+        for image in bpy.data.images
+        if image.get(IMAGE) and not image.library and image.source in ("FILE", "TILED")
+    ]
 
 
 def path_of(image: bpy.types.Image) -> Path:
-    """The file that an image shows."""
+    """The file of an image."""
     return Path(os.path.normpath(bpy.path.abspath(image.filepath)))
 
 
@@ -199,19 +203,21 @@ def is_there(path: Path) -> bool:
     return path.is_file() or bool(tiles_of(path))
 
 
-def _beside(source: Path) -> Path:
-    """A copy of `source` in the folder of images beside the saved file; each result and layout has one of its own."""
+def _copy_beside_file(source: Path) -> Path:
+    """A copy of `source` in the folder of images beside the saved file; each result and layout has its own."""
     check(FOLDER)
     saved, layout = Path(bpy.data.filepath), layout_of(result_of(source))
-    theirs = set()
-    for one in bpy.data.images:
-        folder = Path(one[IMAGE]).parent if one.get(IMAGE) else source.parent
-        if not folder.is_relative_to(source.parent) and not source.is_relative_to(folder):  # objects' lie deeper
-            theirs.add(path_of(one).parent)
+    used = set()
+    for image in bpy.data.images:
+        folder = Path(image[IMAGE]).parent if image.get(IMAGE) else source.parent
+        if not folder.is_relative_to(source.parent) and not source.is_relative_to(
+            folder
+        ):  # those of objects are deeper
+            used.add(path_of(image).parent)
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
-    target = next(one for one in (saved.parent / name / layout for name in names) if one not in theirs) / source.name
+    target = next(path for path in (saved.parent / name / layout for name in names) if path not in used) / source.name
     with refused(f"'{target}' can't be written", "free some space or save the file elsewhere"):
         target.parent.mkdir(parents=True, exist_ok=True)
-        for one in tiles_of(source) or [source]:
-            shutil.copyfile(one, target.parent / one.name)
+        for tile in tiles_of(source) or [source]:
+            shutil.copyfile(tile, target.parent / tile.name)
     return target

@@ -93,7 +93,7 @@ def bringing(
                 yield 0.4 + 0.2 * done / len(objects)
         if shell.world is not None:
             stamp_tree(shell.world)
-        findings = room_changes.found(folder)
+        findings = room_changes.read_findings(folder)
         steps = None
         if top is not None:
             steps = yield from plan(top, fresh)
@@ -112,12 +112,12 @@ def bringing(
         top, differences = fresh, ()
         note_known(top, objects)
     else:
-        differences = room_changes.compare(room_changes.kept(top), findings)
+        differences = room_changes.compare(room_changes.stored_findings(top), findings)
         warnings = commit(steps, top, fresh, shell)
         shell.collection.children.unlink(fresh)
-    room_changes.keep(top, findings)
+    room_changes.store_findings(top, findings)
     target, messages = _place(top, shell, scene, root, steps is None)
-    room_changes.show(target, differences)
+    room_changes.store_changes(target, differences)
     added.remove_unused(steps.replaced if steps is not None else ())
     for datablock, label in steps.names if steps is not None else ():
         datablock.name = label

@@ -72,7 +72,7 @@ def said():
     context = SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, region=None)
     panel.draw(SimpleNamespace(layout=layout, say=panel.say), context)
     assert ("scan_relight.find_result" in layout.buttons) == bool(bridge("results.find").missing())
-    assert ("scan_relight.open_result" in layout.buttons) == bool(bridge("results.find").overtaken())
+    assert ("scan_relight.open_result" in layout.buttons) == bool(bridge("results.find").outdated())
     return layout.text
 
 

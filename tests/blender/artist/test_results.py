@@ -51,7 +51,7 @@ RUN, LATER = "0123456789abcdef", "fedcba9876543210"
 @pytest.fixture
 def results(ops):
     """The registered package's module, with nothing read yet."""
-    module = importlib.import_module("scan_relight.operators.results.told")
+    module = importlib.import_module("scan_relight.operators.results.summary")
     module.file.forget()
     return module
 

@@ -340,7 +340,7 @@ def test_what_differs_is_told(first, artist, tmp_path):
     ball["model"] = "metal" if ball["model"] != "metal" else "specular"
     (other / "materials.json").write_text(json.dumps(told))
     bring(first)
-    shown = changes.shown(bring(other).scene)
+    shown = changes.stored_changes(bring(other).scene)
     assert [one["object_id"] for one in shown] == [ball["object_id"], wall["object_id"]]
     assert "albedo" in shown[1]["text"] and "now" in shown[0]["text"]
 

@@ -84,4 +84,4 @@ def test_sentences_are_put_together(translations, english, other):
 
 def test_english_stays(translations):
     """Where Blender speaks English, or was built without languages."""
-    assert translations.told("Resume") == "Resume"
+    assert translations.translated("Resume") == "Resume"

@@ -52,7 +52,7 @@ def shoot(tmp_path):
         scene.render.resolution_x, scene.render.resolution_y = width, height
         scene.render.resolution_percentage = 100
         scene.cycles.samples = samples
-        pictures.shoot(scene, tmp_path / "shot.exr")
+        pictures.render_to_file(scene, tmp_path / "shot.exr")
         return np.array(read_exr(tmp_path / "shot.exr").rgb)
 
     return render

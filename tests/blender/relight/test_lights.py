@@ -169,7 +169,7 @@ def test_it_aims_at_the_cursor_or_an_object(room):
     room.cursor.location = (2.0, 1.5, 0.6)
     sofa = next(thing for thing in room.objects if thing.name.startswith("sofa "))
     for aim, thing, target in (("CURSOR", None, (2.0, 1.5, 0.6)), ("OBJECT", sofa, sofa.location)):
-        light = lights.add_light(room, "SPOT", aim=aim, thing=thing)
+        light = lights.add_light(room, "SPOT", aim=aim, obj=thing)
         shines = light.matrix_world.to_3x3() @ Vector((0, 0, -1))
         assert shines.angle(Vector(target) - light.matrix_world.translation) < math.radians(1)
     with pytest.raises(BadInputError, match="No object is selected"):

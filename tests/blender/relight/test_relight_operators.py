@@ -154,7 +154,7 @@ def test_before_and_after_puts_every_setting_back(ops, tmp_path, fails, monkeypa
     scene.render.use_border = True
     before = settings(scene)
     module = importlib.import_module("scan_relight.addon.bridge.relight.before_after")
-    shoot, calls = module.shoot, []
+    shoot, calls = module.render_to_file, []
 
     def maybe(*arguments):
         calls.append(arguments)
@@ -162,7 +162,7 @@ def test_before_and_after_puts_every_setting_back(ops, tmp_path, fails, monkeypa
             raise RuntimeError("it fell over")
         shoot(*arguments)
 
-    monkeypatch.setattr(module, "shoot", maybe)
+    monkeypatch.setattr(module, "render_to_file", maybe)
     if fails:
         with pytest.raises(RuntimeError, match="it fell over"):
             ops.before_after(filepath=str(tmp_path / "a.png"), samples=2, percentage=50)

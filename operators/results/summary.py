@@ -1,4 +1,4 @@
-"""What a result folder says of its objects, for the panel: read when a file changed, kept in memory, never saved."""
+"""Facts about the objects of a result folder, for the panel: read when a file changed, kept in memory, never saved."""
 
 from collections import Counter
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ...addon.bridge.results import file, look
-from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
+from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNKNOWN, Result, result_state, result_states
 from ...addon.core.brdf.registry import find, shown
 from ...addon.core.kinds import Shown
 from .. import preferences
@@ -15,13 +15,13 @@ from .. import preferences
 PAGE = "report.html"
 SURE: Shown[float] = 0.15
 FAIR: Shown[float] = 0.4
-"""Interval width up to which an object counts as sure, and as fairly sure."""
+"""Maximum interval width of an object that counts as sure, and as fairly sure."""
 GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 
 
 def folder_of(scene: bpy.types.Scene) -> Path | None:
     """The result folder that a scene's panel is about: the active object's, else the chosen one, else the room's."""
-    state, result = standing(active(scene))
+    state, result = result_state(active(scene))
     if state == FITS:
         return result.folder
     choices = scene.scan_relight
@@ -39,22 +39,22 @@ def active(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def result_of(scene: bpy.types.Scene) -> Result | None:
-    """What is known of a scene's result; None where there is none."""
+    """The result of a scene; None where there is none."""
     folder = folder_of(scene)
     return None if folder is None else file.read(folder)
 
 
-def refused(things) -> list[tuple[str, Path | None]]:
-    """What is said of objects whose values can't be shown, as their folder holds another run or nobody can tell.
+def refused(objects) -> list[tuple[str, Path | None]]:
+    """Messages on objects whose values can't be shown, as their folder has another run or their run is unknown.
 
-    Those whose folder is gone are told by the panel's top (`find_result`).
+    Those whose folder is missing are in the panel at the top (`find_result`).
 
     Returns
     -------
     list of (str, Path or None)
-        A sentence, and the folder whose run has to be brought in; None where nobody can tell.
+        A sentence, and the folder whose run has to be brought in; None where it is unknown.
     """
-    states = [(state, result) for state, result in standings(things).values() if state in (EARLIER, UNTOLD)]
+    states = [(state, result) for state, result in result_states(objects).values() if state in (EARLIER, UNKNOWN)]
     counts = Counter(result.folder if state == EARLIER else None for state, result in states)
     return [
         (
@@ -73,74 +73,76 @@ def refused(things) -> list[tuple[str, Path | None]]:
 
 
 def label(model: str) -> str:
-    """What the panel calls a model."""
+    """Label of a model in the panel."""
     brdf = find(model)
     return brdf.label if brdf else model
 
 
-def interval_width(one: dict[str, Any]) -> float | None:
-    """How unsure an object's material is, 0...1: by its roughness, or half by its relative albedo; None if unknown."""
-    found = []
-    low, high = one.get("roughness_low"), one.get("roughness_high")
-    brdf = shown(one.get("model"))
+def interval_width(entry: dict[str, Any]) -> float | None:
+    """Uncertainty of an object's material, 0...1: of its roughness, or half of its relative albedo; None if unknown."""
+    widths = []
+    low, high = entry.get("roughness_low"), entry.get("roughness_high")
+    brdf = shown(entry.get("model"))
     if brdf.has_lobe and None not in (low, high):
-        found.append(high - low)
-    evidence = one.get("evidence") or {}
+        widths.append(high - low)
+    evidence = entry.get("evidence") or {}
     if brdf.has_albedo:
         mean, low, high = (_mean(evidence.get(key)) for key in ("albedo", "albedo_low", "albedo_high"))
         if None not in (mean, low, high):
-            found.append((high - low) / 2 / max(mean, 1e-3))
-    return min(max(found), 1.0) if found else None
+            widths.append((high - low) / 2 / max(mean, 1e-3))
+    return min(max(widths), 1.0) if widths else None
 
 
-def certainty(one: dict[str, Any]) -> str:
+def certainty(entry: dict[str, Any]) -> str:
     """`interval_width` in a word."""
-    value = interval_width(one)
+    value = interval_width(entry)
     if value is None:
         return "unknown"
     return "sure" if value <= SURE else "fair" if value <= FAIR else "unsure"
 
 
-def specular(one: dict[str, Any]) -> float | None:
-    """An object's reflectance at normal incidence; a metal's is the mean of its colours'."""
-    return _mean(one.get("f0"))
+def specular(entry: dict[str, Any]) -> float | None:
+    """An object's reflectance at normal incidence; for a metal the mean of its channels."""
+    return _mean(entry.get("f0"))
 
 
 def _mean(value) -> float | None:
-    if isinstance(value, (list, tuple)) and value and all(isinstance(one, (int, float)) for one in value):
+    if isinstance(value, (list, tuple)) and value and all(isinstance(item, (int, float)) for item in value):
         return sum(value) / len(value)
     return float(value) if isinstance(value, (int, float)) else None
 
 
-def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
-    """Label and text of everything that the panel tells of an object."""
-    name, evidence = one.get("model", ""), one.get("evidence") or {}
+def facts(entry: dict[str, Any]) -> list[tuple[str, str]]:
+    """Label and text of all facts that the panel shows of an object."""
+    name, evidence = entry.get("model", ""), entry.get("evidence") or {}
     brdf = shown(name)
-    found = [("Model", label(name))]
-    alpha = one.get("alpha")
+    rows = [("Model", label(name))]
+    alpha = entry.get("alpha")
     if alpha is not None:
-        found.append(("Roughness", _between(max(alpha, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
-    value = specular(one)
+        rows.append(
+            ("Roughness", _between(max(alpha, 0) ** 0.5, entry.get("roughness_low"), entry.get("roughness_high")))
+        )
+    value = specular(entry)
     if value is not None:
-        found.append(("Specular F0", _between(value, one.get("f0_low"), one.get("f0_high"))))
-    if brdf.gives_light and one.get("emission") is not None:
-        found.append(("Radiance", ", ".join(f"{part:.3g}" for part in one["emission"])))
+        rows.append(("Specular F0", _between(value, entry.get("f0_low"), entry.get("f0_high"))))
+    if brdf.gives_light and entry.get("emission") is not None:
+        rows.append(("Radiance", ", ".join(f"{channel:.3g}" for channel in entry["emission"])))
     albedo = _mean(evidence.get("albedo"))
     if albedo is not None and not brdf.gives_light:
-        found.append(("Albedo", _between(albedo, *(_mean(evidence.get(k)) for k in ("albedo_low", "albedo_high")))))
+        rows.append(("Albedo", _between(albedo, *(_mean(evidence.get(k)) for k in ("albedo_low", "albedo_high")))))
     if evidence.get("seen_share") is not None:
-        found.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
+        rows.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
     if evidence.get("observations") is not None:
-        found.append(("Views", f"{evidence['observations']:.0f}"))
-    said = one.get("given")
-    if said:
-        found.append(("Given", ", ".join(f"{GIVEN.get(key, key)} {_told(value)}" for key, value in said.items())))
-    return [*found, ("Certainty", certainty(one).capitalize())]
+        rows.append(("Views", f"{evidence['observations']:.0f}"))
+    given = entry.get("given")
+    if given:
+        rows.append(("Given", ", ".join(f"{GIVEN.get(key, key)} {_value_text(value)}" for key, value in given.items())))
+    return [*rows, ("Certainty", certainty(entry).capitalize())]
 
 
-def _told(value) -> str:
+def _value_text(value) -> str:
     if isinstance(value, (list, tuple)):
-        return " ".join(map(_told, value))
+        return " ".join(map(_value_text, value))
     return f"{value:.2f}" if isinstance(value, float) else label(str(value))
 
 
