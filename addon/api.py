@@ -206,8 +206,8 @@ def recover(
         One sentence on what is wrong; `BadInputError` where it is with what was given.
     """
     asked = Asked(reading=reading, override=overrides, white=white)
-    told = progress_of_run(progress, should_stop)
-    run, lay_out = _read(capture, Path(folder), settings or Settings(), told, asked, unwrap)
+    run_progress = progress_of_run(progress, should_stop)
+    run, lay_out = _read(capture, Path(folder), settings or Settings(), run_progress, asked, unwrap)
     with run:
         run.stages(lay_out)
     return Recovered(run)

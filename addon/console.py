@@ -46,18 +46,18 @@ class ConsoleProgress:
     def __init__(self, stream: TextIO, quiet: bool = False):
         self._stream, self._quiet = stream, quiet
         self._tty = stream.isatty()
-        self._stage, self._share, self._said, self._width = None, 0.0, 0.0, 0
+        self._stage, self._share, self._last_write, self._width = None, 0.0, 0.0, 0
 
     def __call__(self, event: ProgressEvent) -> None:
         if self._quiet or not event.stage:
             return
         new, now = event.stage != self._stage, time.monotonic()
         ended = event.share >= 1.0 and (new or self._share < 1.0)
-        due = now - self._said >= (TTY_SECONDS if self._tty else LOG_SECONDS)
+        due = now - self._last_write >= (TTY_SECONDS if self._tty else LOG_SECONDS)
         self._stage, self._share = event.stage, event.share if new else max(event.share, self._share)
         if not (new or ended or due):
             return
-        self._said = now
+        self._last_write = now
         text = f"{event.stage.replace('_', ' '):<12} {self._share:4.0%}   whole {event.overall:4.0%}"
         if event.seconds_left is not None and event.overall < 1:
             text += f"   about {duration(event.seconds_left)} left"
@@ -141,8 +141,8 @@ def _alone(name: str, number: int) -> Iterator[TextIO]:
         return
     standard.flush()
     _flush_c()
-    kept = os.dup(number)
-    stream = os.fdopen(os.dup(kept), "w", 1 if number == 2 else -1, encoding=standard.encoding, errors="replace")
+    saved = os.dup(number)
+    stream = os.fdopen(os.dup(saved), "w", 1 if number == 2 else -1, encoding=standard.encoding, errors="replace")
     null = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, number)
@@ -152,8 +152,8 @@ def _alone(name: str, number: int) -> Iterator[TextIO]:
             stream.close()
         standard.flush()
         _flush_c()
-        os.dup2(kept, number)
-        os.close(kept)
+        os.dup2(saved, number)
+        os.close(saved)
         os.close(null)
 
 

@@ -25,15 +25,15 @@ class JsonProgress:
 
     def __init__(self, stream: TextIO):
         self._stream = stream
-        self._stage, self._share, self._said = None, 0.0, 0.0
+        self._stage, self._share, self._last_write = None, 0.0, 0.0
 
     def __call__(self, event: ProgressEvent) -> None:
         now = time.monotonic()
         new = event.stage != self._stage
         ended = event.share >= 1.0 > self._share
-        if not event.stage or not (new or ended or now - self._said >= EVENT_SECONDS):
+        if not event.stage or not (new or ended or now - self._last_write >= EVENT_SECONDS):
             return
-        self._stage, self._share, self._said = event.stage, event.share, now
+        self._stage, self._share, self._last_write = event.stage, event.share, now
         self.tell(
             "progress", stage=event.stage, share=event.share, overall=event.overall, seconds_left=event.seconds_left
         )
@@ -73,15 +73,15 @@ class Leash:
         return self.wished
 
     def _watch(self) -> None:
-        heard = b""
-        while STOP not in heard:
+        received = b""
+        while STOP not in received:
             try:
-                some = os.read(self._descriptor, 64)
+                chunk = os.read(self._descriptor, 64)
             except OSError:
-                some = b""
-            if not some:
+                chunk = b""
+            if not chunk:
                 break
-            heard = heard[-len(STOP) :] + some
+            received = received[-len(STOP) :] + chunk
         self.wished = True
         time.sleep(self._grace)
         self._end(EXIT_INTERRUPTED)
@@ -103,15 +103,15 @@ class MemoryGuard:
     PERIOD = 0.2
 
     def __init__(self, limit: float | None = None, end: Callable[[str], None] | None = None):
-        free, now = free_memory(), resident_memory()
+        free, resident = free_memory(), resident_memory()
         if limit is None:
-            limit = (now + SHARE * free) / GIGABYTE if free is not None and now is not None else 0.0
+            limit = (resident + SHARE * free) / GIGABYTE if free is not None and resident is not None else 0.0
         self.limit, self.exceeded = limit, False
         BUDGET.limit = int(limit * GIGABYTE)
         self._before = peak_memory() or 0
         self._end = end
         self._done = threading.Event()
-        if limit > 0 and now is not None:
+        if limit > 0 and resident is not None:
             threading.Thread(target=self._watch, name="memory guard", daemon=True).start()
 
     @property
@@ -133,8 +133,8 @@ class MemoryGuard:
 
     def _watch(self) -> None:
         while not self._done.wait(self.PERIOD):
-            now, peak = resident_memory() or 0, peak_memory() or 0
-            if max(now, peak if peak > self._before else 0) > self.limit * GIGABYTE:
+            resident, peak = resident_memory() or 0, peak_memory() or 0
+            if max(resident, peak if peak > self._before else 0) > self.limit * GIGABYTE:
                 self.exceeded = True
                 if self._end is not None and not self._done.wait(GRACE):
                     self._end(self.sentence)

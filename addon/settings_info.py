@@ -44,13 +44,13 @@ def setting_infos() -> tuple[SettingInfo, ...]:
 def _helps(docstring: str) -> dict[str, str]:
     """The texts below a NumPy-style docstring's 'Attributes', by name."""
     _, _, attributes = docstring.partition("Attributes\n----------\n")
-    found: dict[str, list[str]] = {}
+    texts: dict[str, list[str]] = {}
     name = None
     for line in attributes.splitlines():
         head = re.match(r"(\w+) : ", line)
         if head:
             name = head[1]
-            found[name] = []
+            texts[name] = []
         elif name and line.startswith(" "):
-            found[name].append(line.strip())
-    return {name: " ".join(lines).rstrip(".") for name, lines in found.items()}
+            texts[name].append(line.strip())
+    return {name: " ".join(lines).rstrip(".") for name, lines in texts.items()}

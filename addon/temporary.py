@@ -60,9 +60,9 @@ def take_remains(base: Path) -> None:
     """Take away the folders of runs that were killed."""
     for folder in base.glob(f"{NAME}*"):
         with contextlib.suppress(OSError):
-            told = folder.lstat()
-            mine = not hasattr(os, "getuid") or told.st_uid == os.getuid()
-            if not (mine and stat.S_ISDIR(told.st_mode) and (folder / LOCK).is_file()):
+            status = folder.lstat()
+            mine = not hasattr(os, "getuid") or status.st_uid == os.getuid()
+            if not (mine and stat.S_ISDIR(status.st_mode) and (folder / LOCK).is_file()):
                 continue
             with _locked(folder / LOCK, "r+b"):
                 if os.name != "nt":  # there, what is open can't be removed: it can be only where its run has ended

@@ -72,9 +72,9 @@ class Ablation:
     @property
     def names(self) -> tuple[str, ...]:
         """What is taken out: the passes in the registry's order, then those that go together."""
-        check([name for one in self.passes for name in parts(one)])
-        together = tuple(one for one in self.passes if TOGETHER in one)
-        return tuple(one.name for one in PASSES if not self.passes or one.name in self.passes) + together
+        check([name for entry in self.passes for name in parts(entry)])
+        together = tuple(name for name in self.passes if TOGETHER in name)
+        return tuple(item.name for item in PASSES if not self.passes or item.name in self.passes) + together
 
     @property
     def over(self) -> bool:
@@ -92,7 +92,7 @@ def parts(name: str) -> tuple[str, ...]:
 
 def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
     """The runs in some files of lines; one that is there twice counts once, as it came last."""
-    found = {}
+    runs = {}
     for path in paths:
         try:
             lines = path.read_text(encoding="utf-8").splitlines()
@@ -100,16 +100,16 @@ def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
             raise BadInputError(f"'{path}' can't be read ({error.strerror or error}).") from error
         for number, line in enumerate(lines, 1):
             try:
-                one = json.loads(line)
-                found[one["room"], one["preset"], one["seed"], one["without"]] = one
+                run = json.loads(line)
+                runs[run["room"], run["preset"], run["seed"], run["without"]] = run
             except (ValueError, KeyError, TypeError) as error:
                 if number == len(lines):  # a run was stopped as it wrote
                     continue
                 raise BadInputError(f"Line {number} of '{path}' is no run of the ablation.") from error
-    return list(found.values())
+    return list(runs.values())
 
 
-def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: None) -> Path:
+def run_ablation(ablation: Ablation, tell: Callable[[str], None] = lambda text: None) -> Path:
     """Do what is not done yet; the file of lines.
 
     Parameters
@@ -122,45 +122,45 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
     BadInputError
         A room without truth, an unknown pass, a folder that can't be written.
     """
-    for room in asked.rooms:
+    for room in ablation.rooms:
         if not (room / "truth" / "transforms.json").is_file():
             raise BadInputError(f"Room '{room}' has no truth/transforms.json; the ablation needs rooms with truth.")
-    names = asked.names
-    make_folder(asked.out)
-    path = asked.out / LINES
+    names = ablation.names
+    make_folder(ablation.out)
+    path = ablation.out / LINES
     lines = read_lines([path]) if path.exists() else []
     source = digest(Path(corrected.__file__))[:16]
-    done = {(one["room"], one["preset"], one["seed"], one["without"]) for one in lines if one.get("code") == source}
-    for seed in asked.seeds:
-        for room in asked.rooms:
-            todo = [name for name in (WHOLE, *names) if (room.name, asked.preset, seed, name) not in done]
-            if not todo or asked.over:
+    done = {(run["room"], run["preset"], run["seed"], run["without"]) for run in lines if run.get("code") == source}
+    for seed in ablation.seeds:
+        for room in ablation.rooms:
+            todo = [name for name in (WHOLE, *names) if (room.name, ablation.preset, seed, name) not in done]
+            if not todo or ablation.over:
                 continue
-            bench = Bench(asked, room, seed)
+            bench = Bench(ablation, room, seed)
             for name in todo:
-                if asked.over:
+                if ablation.over:
                     break
                 line = bench.run(name) | {"code": source}
                 with open(path, "a", encoding="utf-8") as file:
                     file.write(json.dumps(line) + "\n")
-                tell(_told(line))
+                tell(_describe(line))
     return path
 
 
-def _told(line: dict[str, Any]) -> str:
-    what = f"without {line['without']}" if line["without"] else "whole"
+def _describe(line: dict[str, Any]) -> str:
+    variant = f"without {line['without']}" if line["without"] else "whole"
     same = " (no difference)" if line["same"] else ""
     figures = ", ".join(f"{name} {value:.3f}" for name, value in line["figures"].items() if value is not None)
-    return f"{line['room']} seed {line['seed']} {what}: {figures}; {sum(line['seconds'].values()):.1f} s{same}"
+    return f"{line['room']} seed {line['seed']} {variant}: {figures}; {sum(line['seconds'].values()):.1f} s{same}"
 
 
 class Bench:
     """One room under one seed: the whole run is done or taken from the store, the others start from its stages."""
 
-    def __init__(self, asked: Ablation, room: Path, seed: int):
-        self._asked, self._seed, self.room = asked, seed, room
+    def __init__(self, ablation: Ablation, room: Path, seed: int):
+        self._ablation, self._seed, self.room = ablation, seed, room
         self._capture = read_capture(room)
-        self._folder = asked.out / "stages" / f"{room.name}-{asked.preset}-{seed}"
+        self._folder = ablation.out / "stages" / f"{room.name}-{ablation.preset}-{seed}"
         self._truth = {o["id"]: o for o in json.loads((room / "truth" / "materials.json").read_text())}
         self._views: dict[str, list[dict]] = {}
         self._whole: dict[str, Any] | None = None
@@ -173,12 +173,12 @@ class Bench:
             return self._whole
         if self._whole is None:
             self._whole = self._run(WHOLE, self._folder, SURFACE)
-        other = self._folder.with_name(f"{self._folder.name}-without")
-        shutil.rmtree(other, ignore_errors=True)
+        folder = self._folder.with_name(f"{self._folder.name}-without")
+        shutil.rmtree(folder, ignore_errors=True)
         try:
-            return self._run(name, other, min(map(stage_of, parts(name)), key=RUN_STAGES.index))
+            return self._run(name, folder, min(map(stage_of, parts(name)), key=RUN_STAGES.index))
         finally:
-            shutil.rmtree(other, ignore_errors=True)
+            shutil.rmtree(folder, ignore_errors=True)
 
     def _run(self, name: str, folder: Path, first: str) -> dict[str, Any]:
         before = RUN_STAGES[: RUN_STAGES.index(first)]
@@ -188,8 +188,8 @@ class Bench:
         forget_peak_memory()
         seconds, same = {}, False
         with Store(folder) as store:
-            settings = self._asked.settings(self._seed, name)
-            recovery = Recovery(self._capture, store, settings, Progress(), self._asked.unwrap or _unwrap())
+            settings = self._ablation.settings(self._seed, name)
+            recovery = Recovery(self._capture, store, settings, Progress(), self._ablation.unwrap or _unwrap())
             for stage in STAGES:
                 started = time.process_time()
                 getattr(recovery, stage)()
@@ -209,29 +209,33 @@ class Bench:
                 figures = self._figures(recovery, store)
                 same = name != WHOLE and figures == self._whole["figures"]
         return {
-            "room": self.room.name, "preset": self._asked.preset, "seed": self._seed, "without": name, "same": same,
+            "room": self.room.name, "preset": self._ablation.preset, "seed": self._seed, "without": name, "same": same,
             "figures": figures, "seconds": seconds, "peak_mib": None if memory is None else round(memory / 2**20),
         }  # fmt: skip
 
     def _same(self, stage: str, store: Store) -> bool:
         """Whether a stage holds what the whole run's does."""
         with Store(self._folder) as whole:
-            (mine, told), (theirs, known) = (_stored(one, stage) for one in (store, whole))
-        return told == known and mine.keys() == theirs.keys() and all(_equal(mine[key], theirs[key]) for key in mine)
+            (arrays, meta), (whole_arrays, whole_meta) = (_stored(source, stage) for source in (store, whole))
+        return (
+            meta == whole_meta
+            and arrays.keys() == whole_arrays.keys()
+            and all(_equal(arrays[key], whole_arrays[key]) for key in arrays)
+        )
 
     def _figures(self, recovery: Recovery, store: Store) -> dict[str, float | None]:
         surface = store.stored_key(SURFACE) or ""
         if surface not in self._views:
             self._views = {surface: views(self.room, recovery)}
         seen = self._views[surface]
-        found = score_materials(recovery.materials(), self._truth, pairs(seen))
+        scores = score_materials(recovery.materials(), self._truth, pairs(seen))
         figures = {
             "albedo": psnr(seen, recovery.base_color()),
             "rerender": rerender_psnr(recovery, seen),
-            "roughness_by_pixel": found.roughness_by_pixel,
-            "roughness_by_object": found.roughness_by_object,
-            "right": found.right,
-            "objects": found.objects,
+            "roughness_by_pixel": scores.roughness_by_pixel,
+            "roughness_by_object": scores.roughness_by_object,
+            "right": scores.right,
+            "objects": scores.objects,
         }
         return {key: None if np.isnan(value) else round(float(value), 5) for key, value in figures.items()}
 

@@ -91,7 +91,7 @@ def gain_of(figure: Figure, name: str, runs: Mapping[tuple, Line]) -> Gain | Non
         whole = runs.get((room, seed, WHOLE))
         if left_out != name or whole is None:
             continue
-        with_it, without = (one["figures"].get(figure.name) for one in (whole, line))
+        with_it, without = (run["figures"].get(figure.name) for run in (whole, line))
         if with_it is not None and without is not None:
             pairs.setdefault(room, []).append(figure.sign * figure.scale * (with_it - without))
     if not pairs:
@@ -129,7 +129,7 @@ def write_report(folder: Path, path: Path) -> None:
         There are no lines.
     """
     lines = read_lines(sorted(folder.glob("ablation*.jsonl")))
-    runs = {((one["room"], one["preset"]), one["seed"], one["without"]): one for one in lines}
+    runs = {((line["room"], line["preset"]), line["seed"], line["without"]): line for line in lines}
     if not any(left_out == WHOLE for _, _, left_out in runs):
         raise BadInputError(f"Folder '{folder}' holds no runs of the whole method (ablation*.jsonl).")
     image = path.parent / "images" / f"{path.stem}.png"
@@ -142,10 +142,10 @@ def write_report(folder: Path, path: Path) -> None:
 
 def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
     rooms = sorted({room for room, _, _ in runs})
-    acting = [one for one in PASSES if _acts(one.name, runs)]
-    idle = [one for one in PASSES if _was_run(one.name, runs) and not _acts(one.name, runs)]
-    missing = [one for one in PASSES if not _was_run(one.name, runs)]
-    known = {one.name for one in PASSES}
+    acting = [item for item in PASSES if _acts(item.name, runs)]
+    idle = [item for item in PASSES if _was_run(item.name, runs) and not _acts(item.name, runs)]
+    missing = [item for item in PASSES if not _was_run(item.name, runs)]
+    known = {item.name for item in PASSES}
     others = sorted({name for _, _, name in runs if name not in known and name != WHOLE})
     together, gone = ([name for name in others if (TOGETHER in name) is joined] for joined in (True, False))
     presets = sorted({preset for _, preset in rooms})
@@ -170,7 +170,7 @@ def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
         "What parts of the mesh denoising gain on meshes with known noise: "
         f"[mesh_denoising.md]({appendix}mesh_denoising.md).",
         "",
-        f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
+        f"Rooms ({', '.join(presets)} preset): {', '.join(_room(room) for room in rooms)}. "
         f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}. "
         f"Source of the stages (`code` in report.json): {', '.join(codes) or 'not recorded'}.",
         "",
@@ -179,9 +179,9 @@ def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
         lines += [f"![Gain of albedo against seconds]({image})", ""]
     columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB"]
     columns += ["leave one room out, dB", "seconds", "verdict"]
-    lines += ["## All rooms together", "", *_table(columns, [_summary(one.name, runs) for one in acting]), ""]
+    lines += ["## All rooms together", "", *_table(columns, [_summary(item.name, runs) for item in acting]), ""]
     head = ["pass", *(_room(room) for room in rooms)]
-    lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
+    lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(item, rooms, runs) for item in acting]), ""]
     whole = [["whole method", *(_whole(room, runs) for room in rooms)]]
     lines += ["## The whole method's albedo, dB", "", *_table(head, whole), ""]
     for title, names in (("Taken out of the method since", gone), ("Taken out together", together)):
@@ -190,16 +190,16 @@ def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
     if idle:
         lines += ["## Without effect in these rooms", "", "What these look for is in none of them.", ""]
         lines += _table(
-            ["pass", "does", "seconds"], [[one.name, one.does, _seconds(one.name, runs)] for one in idle]
+            ["pass", "does", "seconds"], [[item.name, item.does, _seconds(item.name, runs)] for item in idle]
         ) + [""]
     if missing:
-        lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
+        lines += ["## Not measured", "", ", ".join(item.name for item in missing) + ".", ""]
         if (path.parent / appendix / OLDER).is_file():
             lines += [f"Figures of older sources: [{OLDER}]({appendix}{OLDER}).", ""]
     lines += [
         "## What they do",
         "",
-        *_table(["pass", "first stage", "does"], [[one.name, one.stage, one.does] for one in acting]),
+        *_table(["pass", "first stage", "does"], [[item.name, item.stage, item.does] for item in acting]),
         "",
     ]
     return "\n".join(lines)
@@ -223,8 +223,8 @@ def _acts(name: str, runs: Mapping[tuple, Line]) -> bool:
 
 
 def _seconds(name: str, runs: Mapping[tuple, Line]) -> str:
-    found = seconds_of(name, runs)
-    return "" if found is None else f"{found:.1f}"
+    seconds = seconds_of(name, runs)
+    return "" if seconds is None else f"{seconds:.1f}"
 
 
 def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
@@ -258,7 +258,7 @@ def _verdict(name: str, runs: Mapping[tuple, Line]) -> str:
         return "one run: open"
     better = [key for key, gain in known.items() if min(_ends(gain)) >= 0 and gain.mean > 2 * gain.error + 1e-9]
     worse = [key for key, gain in known.items() if max(_ends(gain)) <= 0 and gain.mean < -2 * gain.error - 1e-9]
-    words = [f"{verb} {', '.join(some)}" for verb, some in (("gains", better), ("costs", worse)) if some]
+    words = [f"{verb} {', '.join(keys)}" for verb, keys in (("gains", better), ("costs", worse)) if keys]
     return "; ".join(words) or "open"
 
 
@@ -266,15 +266,15 @@ def _ends(gain: Gain) -> tuple[float, float]:
     return gain.leave_one_out or (gain.mean, gain.mean)
 
 
-def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:
-    gain = gain_of(ALBEDO, one.name, runs)
+def _by_room(item: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:
+    gain = gain_of(ALBEDO, item.name, runs)
     by_room = gain.by_room if gain is not None else {}
-    return [one.name, *(_signed(by_room[room]) if room in by_room else "" for room in rooms)]
+    return [item.name, *(_signed(by_room[room]) if room in by_room else "" for room in rooms)]
 
 
 def _whole(room: tuple[str, str], runs: Mapping[tuple, Line]) -> str:
-    found = [line["figures"]["albedo"] for (r, _, name), line in runs.items() if r == room and name == WHOLE]
-    return f"{np.mean(found):.2f}" if found else ""
+    figures = [line["figures"]["albedo"] for (r, _, name), line in runs.items() if r == room and name == WHOLE]
+    return f"{np.mean(figures):.2f}" if figures else ""
 
 
 def _signed(value: float, digits: int = 2, error: float | None = None) -> str:
@@ -288,8 +288,8 @@ def _plot(runs: Mapping[tuple, Line], path: Path) -> None:
     from .plot import write_points
 
     points = []
-    for one in PASSES:
-        gain, seconds = gain_of(ALBEDO, one.name, runs), seconds_of(one.name, runs)
-        if gain is not None and seconds is not None and _acts(one.name, runs):
-            points.append((one.name, seconds, gain.mean, gain.error or 0.0))
+    for item in PASSES:
+        gain, seconds = gain_of(ALBEDO, item.name, runs), seconds_of(item.name, runs)
+        if gain is not None and seconds is not None and _acts(item.name, runs):
+            points.append((item.name, seconds, gain.mean, gain.error or 0.0))
     write_points(points, "processor seconds a room", "gain of albedo, dB", path)

@@ -32,13 +32,13 @@ def write_plot(table: Table, path: Path | str) -> None:
     panels = figure.subplots(max(down, 1), across, squeeze=False).ravel()
     handles = {}
     for panel, case in zip(panels, cases):
-        here = [record for record in records if record[case_column] == case and _is_drawn(record, table)]
-        errors = [record[table.error] for record in here if record[table.error] > 0]
+        drawn = [record for record in records if record[case_column] == case and _is_drawn(record, table)]
+        errors = [record[table.error] for record in drawn if record[table.error] > 0]
         bottom = min(errors, default=1.0) / 4
         panel.set(xscale="log", yscale="log", title=str(case), xlabel=table.cost, ylabel=table.error)
         panel.grid(alpha=0.3)
         for name in names:
-            rows = [record for record in here if record[name_column] == name]
+            rows = [record for record in drawn if record[name_column] == name]
             if not rows:
                 continue
             paper = any(record.get(BASELINE) for record in rows)
@@ -70,9 +70,9 @@ def write_points(points: Sequence[tuple[str, float, float, float]], x: str, y: s
     panel.set_xscale("symlog", linthresh=1)
     panel.set_yscale("symlog", linthresh=1)
     panel.grid(alpha=0.3)
-    for name, at, value, error in points:
-        panel.errorbar(at, value, error, fmt="o", color=COLOURS[0], markersize=4, linewidth=0.8)
-        panel.annotate(name, (at, value), xytext=(4, 3), textcoords="offset points", fontsize=6)
+    for name, cost, value, error in points:
+        panel.errorbar(cost, value, error, fmt="o", color=COLOURS[0], markersize=4, linewidth=0.8)
+        panel.annotate(name, (cost, value), xytext=(4, 3), textcoords="offset points", fontsize=6)
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
 

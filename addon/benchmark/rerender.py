@@ -28,37 +28,37 @@ def rerender_psnr(recovery: Recovery, seen: list[dict]) -> float:
     left_out = [i for i, m in materials.items() if m.model.gives_light or m.model.see_through]
     rng = np.random.default_rng(SEED)
     element, direction, true, levels = [], [], [], []
-    for one in seen:
-        usable = np.flatnonzero(one["inside"] & ~np.isin(one["found"], left_out) & np.isfinite(one["image"]).all(1))
-        level = MIDDLE_GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
+    for view in seen:
+        usable = np.flatnonzero(view["inside"] & ~np.isin(view["found"], left_out) & np.isfinite(view["image"]).all(1))
+        level = MIDDLE_GREY / max(float(np.median(view["image"][usable].mean(1))), 1e-12)
         chosen = rng.choice(usable, min(PIXELS, len(usable)), replace=False)
-        element.append(one["element"][0][chosen])
-        direction.append(one["directions"][chosen])
-        true.append(one["image"][chosen])
+        element.append(view["element"][0][chosen])
+        direction.append(view["directions"][chosen])
+        true.append(view["image"][chosen])
         levels.append(np.full(len(chosen), level, np.float32))
-    number = np.repeat(np.arange(len(levels)), [len(own) for own in levels])
+    number = np.repeat(np.arange(len(levels)), [len(texel_levels) for texel_levels in levels])
     element, direction, true, level = (np.concatenate(x) for x in (element, direction, true, levels))
-    shown = _shown(recovery, materials, element, np.asarray(direction, np.float32))
+    predicted = _predicted(recovery, materials, element, np.asarray(direction, np.float32))
     if any(frame.uncalibrated for frame in recovery.capture.frames):
-        shown = shown * np.median(true.mean(1) / np.maximum(shown.mean(1), 1e-12))
-    error = np.mean((srgb(shown * level[:, None]) - srgb(true * level[:, None])) ** 2, axis=1)
+        predicted = predicted * np.median(true.mean(1) / np.maximum(predicted.mean(1), 1e-12))
+    error = np.mean((srgb(predicted * level[:, None]) - srgb(true * level[:, None])) ** 2, axis=1)
     return float(np.mean([-10 * np.log10(max(float(np.mean(error[number == n])), 1e-12)) for n in range(len(seen))]))
 
 
-def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _predicted(recovery: Recovery, materials: dict, element: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Radiance of elements towards a camera, (m, 3)."""
     field = recovery.field
     object_id = field.atlas.object_id[element]
-    shown = recovery.albedo.rho[element] * recovery.irradiance[element] / np.float32(np.pi)
+    radiance = recovery.albedo.rho[element] * recovery.irradiance[element] / np.float32(np.pi)
     bright = bright_triangles(field)
     for i in np.unique(object_id):
         m = materials[i]
         if not m.model.has_lobe:
             continue
-        own = np.flatnonzero(object_id == i)
+        indices = np.flatnonzero(object_id == i)
         lobe = highlight(
-            field, bright, element[own], direction[own], m.alpha, m.f0, m.model.microfacets, rays=RAYS,
+            field, bright, element[indices], direction[indices], m.alpha, m.f0, m.model.microfacets, rays=RAYS,
             threads=recovery.settings.threads, seed=SEED,
         )  # fmt: skip
-        shown[own] = shown[own] + lobe if m.model.has_diffuse else lobe
-    return shown
+        radiance[indices] = radiance[indices] + lobe if m.model.has_diffuse else lobe
+    return radiance

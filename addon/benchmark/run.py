@@ -168,7 +168,7 @@ def _index(results: dict[str, Table | str], seconds: dict[str, float], options: 
 def describe_machine() -> dict[str, str]:
     """Processor, cores, memory, system and versions, neither host nor path; what can't be found out is left out."""
     bpy = sys.modules.get("bpy")
-    found = {
+    facts = {
         "processor": _processor(),
         "cores": str(thread_count(0)),
         "memory": _memory(),
@@ -179,7 +179,7 @@ def describe_machine() -> dict[str, str]:
         "Blender": bpy.app.version_string if bpy is not None else _version("bpy"),
         "Scan Relight": VERSION,
     }
-    return {name: text for name, text in found.items() if text}
+    return {name: text for name, text in facts.items() if text}
 
 
 def _processor() -> str:

@@ -90,20 +90,20 @@ def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator
             store.drop(measured)
             settings = replace(base, **changes | {"threads": options.threads, "seed": options.seed})
             recovery = Recovery(capture, store, settings, Progress(), unwrap)
-            for one in STAGES[: STAGES.index(measured[0])]:
-                getattr(recovery, one)()
+            for name in STAGES[: STAGES.index(measured[0])]:
+                getattr(recovery, name)()
             gc.collect()  # not in the middle, at one alternative's expense
             started, cpu_started = time.perf_counter(), time.process_time()
-            for one in measured:
-                getattr(recovery, one)()
+            for name in measured:
+                getattr(recovery, name)()
             return recovery, time.perf_counter() - started, time.process_time() - cpu_started
 
     judge = _against_truth(folder) if stage in AGAINST_TRUTH else _against(stage, under(FINEST[stage])[0])
     for done, (name, changes) in enumerate(ALTERNATIVES[stage]):
         recovery, seconds, cpu_seconds = under(changes)
-        told = "" if stage == WHOLE else ", ".join(f"{key} {value}" for key, value in changes.items())
+        description = "" if stage == WHOLE else ", ".join(f"{key} {value}" for key, value in changes.items())
         error, *more = judge(recovery)
-        yield folder.name, name, name == PAPERS, told, error, seconds, cpu_seconds, *more
+        yield folder.name, name, name == PAPERS, description, error, seconds, cpu_seconds, *more
         options.progress.update((done + 1) / len(ALTERNATIVES[stage]))
 
 
@@ -111,15 +111,15 @@ def _against(stage: str, finest: Recovery) -> Callable[[Recovery], tuple]:
     """How far L_d or E is from that of the finest settings, where frames saw the surface."""
     seen = finest.lit_diffuse().seen
 
-    def of_lit_diffuse(one: Recovery) -> tuple:
-        found, true = one.lit_diffuse().radiance, finest.lit_diffuse().radiance
-        both = seen[:, None] & (found > 0) & (true > 0)
-        return (float(np.sqrt(np.mean(np.log(found[both] / true[both]) ** 2))),)
+    def of_lit_diffuse(recovery: Recovery) -> tuple:
+        estimate, true = recovery.lit_diffuse().radiance, finest.lit_diffuse().radiance
+        both = seen[:, None] & (estimate > 0) & (true > 0)
+        return (float(np.sqrt(np.mean(np.log(estimate[both] / true[both]) ** 2))),)
 
-    def of_shading(one: Recovery) -> tuple:
-        found, true = one.shading().irradiance[seen].mean(1), finest.shading().irradiance[seen].mean(1)
+    def of_shading(recovery: Recovery) -> tuple:
+        estimate, true = recovery.shading().irradiance[seen].mean(1), finest.shading().irradiance[seen].mean(1)
         lit = true > 0
-        return (float(np.sqrt(np.mean((found[lit] / true[lit] - 1) ** 2))),)
+        return (float(np.sqrt(np.mean((estimate[lit] / true[lit] - 1) ** 2))),)
 
     return {"lit_diffuse": of_lit_diffuse, "shading": of_shading}[stage]
 
@@ -129,16 +129,16 @@ def _against_truth(folder: Path) -> Callable[[Recovery], tuple]:
     path = folder / "truth" / "materials.json"
     if not path.is_file():
         raise SkippedStage("It needs a capture with truth/materials.json beside its frames.")
-    truth = {one["id"]: one for one in json.loads(path.read_text(encoding="utf-8"))}
+    truth = {entry["id"]: entry for entry in json.loads(path.read_text(encoding="utf-8"))}
     has_views = (folder / "truth" / "transforms.json").is_file()
 
-    def judge(one: Recovery) -> tuple:
-        known = [(m, truth[m.object_id]) for m in one.materials() if m.object_id in truth]
+    def judge(recovery: Recovery) -> tuple:
+        known = [(m, truth[m.object_id]) for m in recovery.materials() if m.object_id in truth]
         pairs = [(written_roughness(m), true_roughness(t)) for m, t in known]
-        off = [abs(found - true) for found, true in pairs if true is not None]
+        errors = [abs(estimate - true) for estimate, true in pairs if true is not None]
         right = sum(m.model.name == true_kind(t) for m, t in known)
-        albedo = psnr(views(folder, one), one.base_color()) if has_views else None
+        albedo = psnr(views(folder, recovery), recovery.base_color()) if has_views else None
         memory = peak_memory()
-        return float(np.mean(off)), f"{right} of {len(known)}", albedo, None if memory is None else memory / 2**20
+        return float(np.mean(errors)), f"{right} of {len(known)}", albedo, None if memory is None else memory / 2**20
 
     return judge

@@ -41,13 +41,13 @@ class MaterialScores:
         return sum(n for name, n in self.models.items() if len(set(name.split(" as "))) == 1)
 
 
-def true_kind(known: Mapping[str, Any]) -> str:
+def true_kind(entry: Mapping[str, Any]) -> str:
     """The name of the model of an object of truth/materials.json."""
-    if known["emission"]:
+    if entry["emission"]:
         return "emitter"
-    if known["metallic"]:
+    if entry["metallic"]:
         return "metal"
-    diffuse = known["alpha"] is None if "bsdf" not in known else known["bsdf"] == "diffuse"  # the demo has none
+    diffuse = entry["alpha"] is None if "bsdf" not in entry else entry["bsdf"] == "diffuse"  # the demo has none
     return "lambertian" if diffuse else "specular"
 
 
@@ -58,13 +58,13 @@ def found_roughness(material: ObjectMaterial) -> float | None:
 
 def written_roughness(material: ObjectMaterial) -> float:
     """sqrt(alpha), Blender's own where none was found."""
-    rough = found_roughness(material)
-    return UNTOLD if rough is None else rough
+    roughness = found_roughness(material)
+    return UNTOLD if roughness is None else roughness
 
 
-def true_roughness(known: Mapping[str, Any]) -> float | None:
+def true_roughness(entry: Mapping[str, Any]) -> float | None:
     """sqrt(alpha) in truth."""
-    return None if known["alpha"] is None or known["emission"] else float(np.sqrt(known["alpha"]))
+    return None if entry["alpha"] is None or entry["emission"] else float(np.sqrt(entry["alpha"]))
 
 
 def score_materials(
@@ -79,25 +79,25 @@ def score_materials(
     pixels : mapping of (int, int) to int
         Of each object of the truth, by the object found there: `truth_views.pairs`.
     """
-    found = {material.object_id: material for material in materials}
-    shown: dict[int, dict[int, int]] = {}
+    by_id = {material.object_id: material for material in materials}
+    pixels_of: dict[int, dict[int, int]] = {}
     for (true_id, found_id), count in pixels.items():
-        if true_id in truth and found_id in found:
-            shown.setdefault(true_id, {})[found_id] = count
+        if true_id in truth and found_id in by_id:
+            pixels_of.setdefault(true_id, {})[found_id] = count
     errors, weights, models = [], [], Counter[str]()
-    for true_id, by_part in sorted(shown.items()):
-        known, seen = truth[true_id], sum(by_part.values())
-        if seen < LEAST_PIXELS or known["masked"] or known["bsdf"] == "dielectric":
+    for true_id, by_part in sorted(pixels_of.items()):
+        entry, seen = truth[true_id], sum(by_part.values())
+        if seen < LEAST_PIXELS or entry["masked"] or entry["bsdf"] == "dielectric":
             continue
-        true = true_roughness(known)
+        true = true_roughness(entry)
         if true is not None:
-            off = {i: abs(written_roughness(found[i]) - true) for i in by_part}
-            errors.append(sum(off[i] * n for i, n in by_part.items()) / seen)
+            error = {i: abs(written_roughness(by_id[i]) - true) for i in by_part}
+            errors.append(sum(error[i] * n for i, n in by_part.items()) / seen)
             weights.append(seen)
         by_kind: Counter[str] = Counter()
         for i, n in by_part.items():
-            by_kind[found[i].model.name] += n
-        models[f"{true_kind(known)} as {by_kind.most_common(1)[0][0]}"] += 1
+            by_kind[by_id[i].model.name] += n
+        models[f"{true_kind(entry)} as {by_kind.most_common(1)[0][0]}"] += 1
     if not errors:
         return MaterialScores(float("nan"), float("nan"), models)
     return MaterialScores(float(np.average(errors, weights=weights)), float(np.mean(errors)), models)

@@ -25,7 +25,7 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
     spec = json.loads((capture / "truth" / "transforms.json").read_text())
     objects = {o["id"]: o for o in json.loads((capture / "truth" / "materials.json").read_text())}
     plain = {i for i, o in objects.items() if not (o["emission"] or o["metallic"] or o["masked"])}
-    found = []
+    result = []
     for frame in spec["frames"]:
         name = Path(frame["file_path"]).name
         camera = Camera(*(spec[k] for k in ("w", "h", "fl_x", "fl_y", "cx", "cy")), np.array(frame["transform_matrix"]))
@@ -45,13 +45,13 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
         truth = read_exr(capture / "truth" / "albedo" / name).rgb.reshape(-1, 3)
         element = np.stack(elements)
         inside = inside.ravel() & (element >= 0).all(0)
-        found.append({
+        result.append({
             "element": element, "truth": truth, "counts": inside & np.isin(ids.ravel(), list(plain)),
             "id": ids.ravel(), "found": surface.atlas.object_id[element[0]], "inside": inside,
             "image": read_exr(capture / "truth" / "image" / name).rgb.reshape(-1, 3),
             "directions": -camera.directions(camera.pixel_centres()),
         })  # fmt: skip
-    return found
+    return result
 
 
 def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) -> float:
@@ -59,8 +59,8 @@ def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) ->
     result = []
     for view in seen:
         counts = view["counts"] if only is None else view["counts"] & only[view["element"]].all(0)
-        shown = value[view["element"]].mean(0)
-        error = np.clip(shown[counts], 0, 1) - np.clip(view["truth"][counts], 0, 1)
+        image = value[view["element"]].mean(0)
+        error = np.clip(image[counts], 0, 1) - np.clip(view["truth"][counts], 0, 1)
         if counts.sum() > 100:
             result.append(-10 * np.log10(np.mean(error**2)))
     return float(np.mean(result))

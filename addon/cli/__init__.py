@@ -55,8 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     give_back_at_once()
     use_own_folder()
     try:
-        for told in vars(arguments).values():
-            for path in told if isinstance(told, list) else [told]:
+        for value in vars(arguments).values():
+            for path in value if isinstance(value, list) else [value]:
                 if isinstance(path, Path):
                     check_path(path)
         with own_console(keep_others=arguments.debug) as stream:
@@ -85,8 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 class Parser(argparse.ArgumentParser):
     """A parser that tells the exit codes, and what is wrong in one sentence instead of a page of usage."""
 
-    def __init__(self, *args, **told):
-        super().__init__(*args, epilog=EXIT_CODES, **told)
+    def __init__(self, *args, **options):
+        super().__init__(*args, epilog=EXIT_CODES, **options)
 
     def error(self, message: str):
         """End with exit code 2."""

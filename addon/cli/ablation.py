@@ -54,9 +54,9 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     from ..core.passes.registry import passes
 
     if arguments.list:
-        width = max(len(one.name) for one in passes())
-        for one in passes():
-            print(f"{one.name:{width}}  {one.stage:11}  {one.does}", file=stream)
+        width = max(len(item.name) for item in passes())
+        for item in passes():
+            print(f"{item.name:{width}}  {item.stage:11}  {item.does}", file=stream)
         return EXIT_OK
     if arguments.out is None:
         raise BadInputError("Option --out names the folder of the runs; give it.")
@@ -73,7 +73,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         raise BadInputError("Options --seeds and --threads take whole numbers of at least 0.")
     from ..benchmark.ablation import Ablation, run_ablation
 
-    asked = Ablation(
+    ablation = Ablation(
         arguments.rooms,
         arguments.out,
         arguments.seeds,
@@ -83,7 +83,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         60 * arguments.limit_minutes,
     )
     path = run_ablation(
-        asked, (lambda text: None) if arguments.quiet else lambda text: print(text, file=stream, flush=True)
+        ablation, (lambda text: None) if arguments.quiet else lambda text: print(text, file=stream, flush=True)
     )
     if not arguments.quiet:
         print(f"Runs: {path}", file=stream)

@@ -41,8 +41,8 @@ def reading_from(arguments: argparse.Namespace):
     def import_mesh(path: Path):
         return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
 
-    told = {field.name: getattr(arguments, field.name) for field in fields(Reading) if field.compare}
-    return Reading(**told, import_mesh=import_mesh)
+    values = {field.name: getattr(arguments, field.name) for field in fields(Reading) if field.compare}
+    return Reading(**values, import_mesh=import_mesh)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:

@@ -78,8 +78,12 @@ def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str,
     with needed_packages():
         from ..core.pipeline.run import Asked
 
-        told = {"override": arguments.override, "heed_kept": not arguments.no_overrides, "white": arguments.white}
-        asked = Asked(reading=reading, **told, **stages)
+        corrections = {
+            "override": arguments.override,
+            "heed_kept": not arguments.no_overrides,
+            "white": arguments.white,
+        }
+        asked = Asked(reading=reading, **corrections, **stages)
         asked.check(arguments.capture, arguments.out)
         if arguments.scene:
             return partial(need("job.run").run, asked=asked)
@@ -98,6 +102,6 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
     made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
     line = f"Done in {duration(report['seconds'])}: {arguments.out / made}"
-    told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}
-    tell_end(arguments, stream, console["listener"], report.get("warnings", ()), line, **told)
+    values = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}
+    tell_end(arguments, stream, console["listener"], report.get("warnings", ()), line, **values)
     return EXIT_OK

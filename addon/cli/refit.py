@@ -49,6 +49,6 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         )
     seconds, objects = report["refit"]["seconds"], report["refit"]["objects"]
     line = f"Fitted again in {duration(seconds)}: object {', '.join(map(str, objects))} of {arguments.result}"
-    told = {"seconds": seconds, "result": str(arguments.result.absolute()), "objects": objects}
-    tell_end(arguments, stream, console["listener"], report["warnings"], line, **told)
+    values = {"seconds": seconds, "result": str(arguments.result.absolute()), "objects": objects}
+    tell_end(arguments, stream, console["listener"], report["warnings"], line, **values)
     return EXIT_OK

@@ -96,6 +96,6 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             arguments.device,
             arguments.scene,
         )
-    told = {"picture": str(arguments.out.absolute())}
-    tell_end(arguments, stream, console["listener"], remarks, f"Done: {arguments.out}", kind="Note", **told)
+    values = {"picture": str(arguments.out.absolute())}
+    tell_end(arguments, stream, console["listener"], remarks, f"Done: {arguments.out}", kind="Note", **values)
     return EXIT_OK

@@ -94,10 +94,10 @@ def _add_rooms(parser: argparse.ArgumentParser) -> None:
 
 
 def _block(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-    if not found or not 1 <= int(found[1]) <= int(found[2]):
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
         raise argparse.ArgumentTypeError(f"'{text}' is no block; give I/N, with I from 1 to N")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def options_of(arguments: argparse.Namespace) -> list[str]:
@@ -127,9 +127,9 @@ def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         with unit(arguments.out, arguments.stage, arguments.block, console["should_stop"]):
             report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
     line = f"Done in {duration(report['seconds'])}: stage '{arguments.stage}' of {arguments.out}"
-    told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
+    values = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
     warnings = report.get("warnings", ()) if arguments.stage == WRITE else ()
-    tell_end(arguments, stream, console["listener"], warnings, line, **told)
+    tell_end(arguments, stream, console["listener"], warnings, line, **values)
     return EXIT_OK
 
 
@@ -139,9 +139,9 @@ def _rooms(arguments: argparse.Namespace) -> list[Room]:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
     with needed_packages():
         from ..core.pipeline.stages import STAGES
-    divided = tuple(one.name for one in STAGES if one.divided_by and one.name not in settings.published)
-    asked = arguments.rooms, arguments.list, arguments.out, arguments.blocks, arguments.program
-    return rooms_from(*asked, options_of(arguments), divided)
+    divided = tuple(stage.name for stage in STAGES if stage.divided_by and stage.name not in settings.published)
+    requested = arguments.rooms, arguments.list, arguments.out, arguments.blocks, arguments.program
+    return rooms_from(*requested, options_of(arguments), divided)
 
 
 def plan_command(arguments: argparse.Namespace, stream: TextIO) -> int:

@@ -25,22 +25,22 @@ LONGEST: Shown[int] = 1 << 24
 NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."
 
 
-def _ask(address: str, way: str, content: dict[str, Any] | None = None) -> Any:
+def _ask(address: str, path: str, content: dict[str, Any] | None = None) -> Any:
     """The manager's answer; LookupError where it knows no such way."""
     data = None if content is None else json.dumps(content).encode()
     headers = {"Content-Type": "application/json", "Accept": "application/json"}
     try:
         if urllib.parse.urlsplit(address).scheme not in ("http", "https"):
             raise BadInputError(f"'{address}' is no manager's address; give --manager as {MANAGER}.")
-        request = urllib.request.Request(urllib.parse.urljoin(address.rstrip("/") + "/", way), data, headers)
+        request = urllib.request.Request(urllib.parse.urljoin(address.rstrip("/") + "/", path), data, headers)
         with urllib.request.urlopen(request, timeout=SECONDS) as answer:
             return json.loads(answer.read(LONGEST))
     except urllib.error.HTTPError as error:
         with error:
-            told = _message(error.read(LONGEST))
+            message = _message(error.read(LONGEST))
         if error.code == 404:
-            raise LookupError(told) from error
-        raise BadInputError(f"Flamenco's manager at {address} refused ({error.code}): {told}.") from error
+            raise LookupError(message) from error
+        raise BadInputError(f"Flamenco's manager at {address} refused ({error.code}): {message}.") from error
     except OSError as error:
         reason = getattr(error, "reason", error)
         raise BadInputError(f"Flamenco's manager at {address} can't be reached ({reason}).") from error

@@ -27,8 +27,8 @@ def template(room: Room) -> dict[str, Any]:
                 )
         words = [known.get(word, word) for word in words]
         step: dict[str, Any] = {"name": name}
-        if after := list(dict.fromkeys(names[one] for one in task.after)):
-            step["dependencies"] = [{"dependsOn": one} for one in after]
+        if after := list(dict.fromkeys(names[name] for name in task.after)):
+            step["dependencies"] = [{"dependsOn": dependency} for dependency in after]
         if task.block:
             blocks = {"name": "Block", "type": "INT", "range": "1-{{Param.Blocks}}"}
             step["parameterSpace"] = {"taskParameterDefinitions": [blocks]}

@@ -96,16 +96,16 @@ class Room:
         """The graph, for JSON."""
         tasks = [
             {
-                "name": one.name,
-                "stage": one.stage,
-                "block": list(one.block) if one.block else None,
-                "after": list(one.after),
-                "command": self.command(one.stage, "{}/{}".format(*one.block) if one.block else ""),
+                "name": task.name,
+                "stage": task.stage,
+                "block": list(task.block) if task.block else None,
+                "after": list(task.after),
+                "command": self.command(task.stage, "{}/{}".format(*task.block) if task.block else ""),
             }
-            for one in self.tasks()
+            for task in self.tasks()
         ]
-        told = {"room": self.name, "capture": str(self.capture), "result": str(self.result), "blocks": self.blocks}
-        return told | {"program": list(self.program), "options": list(self.options), "tasks": tasks}
+        entry = {"room": self.name, "capture": str(self.capture), "result": str(self.result), "blocks": self.blocks}
+        return entry | {"program": list(self.program), "options": list(self.options), "tasks": tasks}
 
     def write(self, name: str, content: str | dict[str, Any]) -> Path:
         """Write a file of the room's farm folder, a text or JSON, whole or not at all. Raises `StorageError`."""
@@ -160,7 +160,7 @@ def rooms_from(
     """
     if blocks < 1:
         raise BadInputError(f"A stage can't be divided into {blocks} blocks; give 1 or more.")
-    wanted = [(one, results / one.absolute().name) for one in captures]
+    wanted = [(capture, results / capture.absolute().name) for capture in captures]
     if listed is not None:
         try:
             lines = listed.read_text(encoding="utf-8").splitlines()
@@ -168,13 +168,15 @@ def rooms_from(
             raise BadInputError(f"List of rooms '{listed}' can't be read ({error}); give a text file.") from error
         for line in filter(str.strip, lines):
             capture, _, result = line.partition("\t")
-            one = listed.parent / capture.strip()
-            wanted.append((one, listed.parent / result.strip() if result.strip() else results / one.absolute().name))
+            folder = listed.parent / capture.strip()
+            wanted.append(
+                (folder, listed.parent / result.strip() if result.strip() else results / folder.absolute().name)
+            )
     if not wanted:
         raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
     command = tuple(shlex.split(program)) or (PROGRAM,)
-    how = blocks, command, tuple(options), divided
-    rooms = [Room(capture.absolute(), result.absolute(), *how) for capture, result in wanted]
+    shared = blocks, command, tuple(options), divided
+    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in wanted]
     taken: dict[Path, Path] = {}
     for room in rooms:
         if room.result.resolve() == room.capture.resolve():

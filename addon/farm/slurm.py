@@ -32,7 +32,7 @@ def submit(room: Room, limits: dict[str, str]) -> list[str]:
             if first is not None and first in numbers:
                 numbers[task.name] = numbers[first]
                 continue
-            after = list(dict.fromkeys(numbers[one] for one in task.after))
+            after = list(dict.fromkeys(numbers[name] for name in task.after))
             script = room.write(f"{task.stage}{'-blocks' if task.block else ''}.sh", script_of(room, task, limits))
             chain = [f"--dependency=afterok:{':'.join(after)}", "--kill-on-invalid-dep=yes"] if after else []
             numbers[task.name] = _sbatch([*chain, str(script)])
@@ -51,13 +51,13 @@ def _first(task: Task) -> str | None:
 def script_of(room: Room, task: Task, limits: dict[str, str]) -> str:
     """The batch script of a unit of work, or of all blocks of a stage."""
     log = f"{room.farm}/{task.stage}".replace("%", "%%") + "-%j.log"
-    asked = limits | {"job-name": f"{_plain(room.name)}:{task.name if not task.block else task.stage}", "output": log}
+    options = limits | {"job-name": f"{_plain(room.name)}:{task.name if not task.block else task.stage}", "output": log}
     if task.block:
-        asked["array"] = f"1-{task.block[1]}"
-    for value in asked.values():
+        options["array"] = f"1-{task.block[1]}"
+    for value in options.values():
         if "\n" in value or '"' in value:
             raise BadInputError(f"Slurm takes no line break and no double quote in '{value}'; name it otherwise.")
-    lines = [f'#SBATCH --{name}="{value}"' for name, value in asked.items() if value]
+    lines = [f'#SBATCH --{name}="{value}"' for name, value in options.items() if value]
     block = f"$SLURM_ARRAY_TASK_ID/{task.block[1]}" if task.block else ""
     words = [f'"{word}"' if word == block else shlex.quote(word) for word in room.command(task.stage, block)]
     return "\n".join(["#!/bin/sh", *lines, f"exec {' '.join(words)}", ""])

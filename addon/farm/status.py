@@ -46,9 +46,9 @@ class RoomState:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        units = [vars(one) for one in self.units]
-        told = {"room": self.result.name, "result": str(self.result), "state": self.state, "stage": self.stage}
-        return told | {"share": round(self.share, 4), "error": self.error, "units": units}
+        units = [vars(unit) for unit in self.units]
+        entry = {"room": self.result.name, "result": str(self.result), "state": self.state, "stage": self.stage}
+        return entry | {"share": round(self.share, 4), "error": self.error, "units": units}
 
 
 def look(result: Path) -> RoomState:
@@ -59,37 +59,37 @@ def look(result: Path) -> RoomState:
     except FileNotFoundError:
         named = [(stage, stage) for stage in RUN_STAGES] if (result / FOLDER).is_dir() else []
     except (OSError, ValueError, KeyError, TypeError) as error:
-        told = f"Its plan can't be read ({type(error).__name__}); submit it again."
-        return RoomState(result, FAILED, "", 0.0, told, ())
+        message = f"Its plan can't be read ({type(error).__name__}); submit it again."
+        return RoomState(result, FAILED, "", 0.0, message, ())
     if not named:
         done = (result / REPORT).is_file()  # by one machine
         return RoomState(result, DONE if done else UNKNOWN, "", float(done), "", ())
     units = [_unit(result, name, stage) for name, stage in named]
     # What was joined needs its blocks no more.
-    joined = {one.stage for one in units if one.name == one.stage and one.state == DONE}
-    units = [UnitState(**(vars(one) | {"state": DONE})) if one.stage in joined else one for one in units]
-    cost = [COST.get(one.stage, 1) / sum(other.stage == one.stage for other in units) for one in units]
-    share = sum(c for c, one in zip(cost, units, strict=True) if one.state == DONE) / sum(cost)
-    left = [one for one in units if one.state != DONE]
-    state = next((s for s in (RUNNING, FAILED, WAITING) if any(one.state == s for one in left)), DONE)
-    stage = next((one.stage for one in left if one.state == state), "")
-    error = next((one.error for one in left if one.state == FAILED), "")
+    joined = {unit.stage for unit in units if unit.name == unit.stage and unit.state == DONE}
+    units = [UnitState(**(vars(unit) | {"state": DONE})) if unit.stage in joined else unit for unit in units]
+    cost = [COST.get(unit.stage, 1) / sum(sibling.stage == unit.stage for sibling in units) for unit in units]
+    share = sum(c for c, unit in zip(cost, units, strict=True) if unit.state == DONE) / sum(cost)
+    left = [unit for unit in units if unit.state != DONE]
+    state = next((s for s in (RUNNING, FAILED, WAITING) if any(unit.state == s for unit in left)), DONE)
+    stage = next((unit.stage for unit in left if unit.state == state), "")
+    error = next((unit.error for unit in left if unit.state == FAILED), "")
     return RoomState(result, state, stage, share, error, tuple(units))
 
 
 def _unit(result: Path, name: str, stage: str) -> UnitState:
-    told = json_if_sound(result / FOLDER / f"{name}.json")
-    who, error = owner(result / FOLDER / f"{name}.lock"), str(told.get("error", ""))
-    if who:
-        return UnitState(name, stage, RUNNING, who)
+    mark = json_if_sound(result / FOLDER / f"{name}.json")
+    holder, error = owner(result / FOLDER / f"{name}.lock"), str(mark.get("error", ""))
+    if holder:
+        return UnitState(name, stage, RUNNING, holder)
     if error:
-        return UnitState(name, stage, FAILED, str(told.get("machine", "")), error=error)
+        return UnitState(name, stage, FAILED, str(mark.get("machine", "")), error=error)
     # A mark tells of what is there: stages may be cleared, or done anew.
-    there = (result / REPORT).is_file() if stage == WRITE else told.get("key") and stored_key(result, name)
-    if not told or not there or (stage != WRITE and told["key"] != there):
+    stored = (result / REPORT).is_file() if stage == WRITE else mark.get("key") and stored_key(result, name)
+    if not mark or not stored or (stage != WRITE and mark["key"] != stored):
         return UnitState(name, stage, WAITING)
-    seconds, memory = float(told.get("seconds", 0)), int(told.get("peak_memory_bytes", 0))
-    return UnitState(name, stage, DONE, str(told.get("machine", "")), seconds, memory)
+    seconds, memory = float(mark.get("seconds", 0)), int(mark.get("peak_memory_bytes", 0))
+    return UnitState(name, stage, DONE, str(mark.get("machine", "")), seconds, memory)
 
 
 def table(rooms: list[RoomState]) -> str:
@@ -107,16 +107,16 @@ def page(rooms: list[RoomState], folder: Path) -> str:
     """An HTML page over all rooms, which lies in `folder`: it names the rooms' pages by their way from there."""
     body = []
     for room in rooms:
-        name, there = html.escape(room.result.name), room.result.absolute() / PAGE
-        if there.is_file():
-            name = f'<a href="{html.escape(_link(there, folder))}">{name}</a>'
-        seconds = sum(one.seconds for one in room.units)
-        memory = max((one.memory for one in room.units), default=0)
+        name, page_path = html.escape(room.result.name), room.result.absolute() / PAGE
+        if page_path.is_file():
+            name = f'<a href="{html.escape(_link(page_path, folder))}">{name}</a>'
+        seconds = sum(unit.seconds for unit in room.units)
+        memory = max((unit.memory for unit in room.units), default=0)
         cells = [name, room.state, html.escape(LABELS.get(room.stage, room.stage)), f"{room.share:.0%}"]
         cells += [f"{seconds:.0f} s", f"{memory / 2**30:.1f} GiB", html.escape(room.error)]
         cells = "".join(f"<td>{cell}</td>" for cell in cells)
         body.append(f'<tr class="{room.state.replace(" ", "-")}">{cells}</tr>')
-    head = "".join(f"<th>{one}</th>" for one in ("Room", "State", "Stage", "Done", "Time", "Memory", "Error"))
+    head = "".join(f"<th>{title}</th>" for title in ("Room", "State", "Stage", "Done", "Time", "Memory", "Error"))
     done = sum(room.state == DONE for room in rooms)
     return _PAGE.format(done=done, count=len(rooms), head=head, body="\n".join(body))
 

@@ -30,19 +30,19 @@ def unit(result: Path, stage: str, block: tuple[int, int] | None, should_stop: C
     make_folder(folder)
     with held(folder / f"{name}.lock", should_stop):
         started = time.monotonic()
-        told: dict[str, Any] = {"machine": machine().split()[0]}
+        mark: dict[str, Any] = {"machine": machine().split()[0]}
         try:
             yield
         except (InterruptedRun, KeyboardInterrupt):
             raise
         except Exception as error:
             known = isinstance(error, ScanRelightError)
-            told["error"] = str(error) if known else one_line(f"{type(error).__name__}: {error}")
+            mark["error"] = str(error) if known else one_line(f"{type(error).__name__}: {error}")
             with contextlib.suppress(ScanRelightError):  # the error itself may be a full disk
-                _mark(folder, name, told)
+                _mark(folder, name, mark)
             raise
-        told |= {"seconds": round(time.monotonic() - started, 2), "peak_memory_bytes": peak_memory()}
-        _mark(folder, name, told | {"key": stored_key(result, name)})
+        mark |= {"seconds": round(time.monotonic() - started, 2), "peak_memory_bytes": peak_memory()}
+        _mark(folder, name, mark | {"key": stored_key(result, name)})
 
 
 def stored_key(result: Path, name: str) -> str | None:
@@ -53,5 +53,5 @@ def stored_key(result: Path, name: str) -> str | None:
         return None
 
 
-def _mark(folder: Path, name: str, told: dict[str, Any]) -> None:
-    write_bytes(folder / f"{name}.json", json.dumps(told, ensure_ascii=False).encode() + b"\n")
+def _mark(folder: Path, name: str, mark: dict[str, Any]) -> None:
+    write_bytes(folder / f"{name}.json", json.dumps(mark, ensure_ascii=False).encode() + b"\n")

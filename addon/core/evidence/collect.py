@@ -23,11 +23,15 @@ class Evidence:
         return np.stack([self.texels.shading, self.texels.clipped, self.texels.unseen], -1)
 
 
-def collect(found: Findings) -> Evidence:
-    """The evidence of a finished recovery; a few thousand spots are gathered at again."""
-    atlas, lit, albedo = found.surface.atlas, found.lit_diffuse, found.albedo
-    own = without_light(atlas, lit, albedo)
-    light = light_evidence(found.field, found.shading, lit, own, threads=found.threads, seed=found.seed)
-    texels = texel_evidence(atlas, lit, albedo, own, light, found.materials, found.specular, found.irradiance)
-    texels.albedo[np.isin(atlas.object_id, list(found.coloured))] = 0
+def collect(findings: Findings) -> Evidence:
+    """The evidence of a finished recovery; E is gathered again at a few thousand elements."""
+    atlas, lit, albedo = findings.surface.atlas, findings.lit_diffuse, findings.albedo
+    intrinsic = without_light(atlas, lit, albedo)
+    light = light_evidence(
+        findings.field, findings.shading, lit, intrinsic, threads=findings.threads, seed=findings.seed
+    )
+    texels = texel_evidence(
+        atlas, lit, albedo, intrinsic, light, findings.materials, findings.specular, findings.irradiance
+    )
+    texels.albedo[np.isin(atlas.object_id, list(findings.coloured))] = 0
     return Evidence(light, texels, object_evidence(atlas, lit, albedo, texels))

@@ -1,4 +1,4 @@
-"""How sure the irradiance E is: gathered anew at a few thousand spots, and how much of it no frame looked at.
+"""Uncertainty of the irradiance E: gathered anew at a few thousand elements, and its share that no frame looked at.
 
 The same light is gathered twice with other rays, E_a and E_b. How far they differ from each other is their own noise;
 how much further they differ from E is the error of E, be it its rays' or its interpolation's.
@@ -56,7 +56,7 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     Parameters
     ----------
     seen : (n,) bool
-        What was seen stands for what was seen, the rest for the rest.
+        Elements that were seen stand for such, unseen ones for unseen ones.
 
     Returns
     -------
@@ -91,29 +91,29 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
     clipped = lit.tier == SATURATED
     surface = (~lit.seen | clipped) & ~solved
-    off = np.where(
+    error = np.where(
         clipped, CALIBRATION.poorly, CALIBRATION.surfaces * np.minimum(np.hypot(relative_error, CALIBRATION.roughly), 1)
     )
-    kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * CALIBRATION.solved]
+    kinds = [luminance * (surface | solved), luminance * surface * error, luminance * solved * CALIBRATION.solved]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
     sky = np.stack([sky, np.zeros_like(sky), CALIBRATION.roughly * sky], -1).astype(np.float32)
     sun = None
     if shading.sun is not None and not shading.sun.seen:
         level = float(shading.sun.irradiance @ LUMINANCE)
         sun = replace(shading.sun, irradiance=np.array([level, 0, CALIBRATION.solved * level], np.float32))
-    room = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
+    unseen_light = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
     openings = field.openings
     if openings is not None:
-        shown = openings.radiance @ LUMINANCE
-        shown = np.stack([shown, np.zeros_like(shown), CALIBRATION.roughly * shown], -1).astype(np.float32)
-        openings = replace(openings, radiance=shown)
-    return room.with_sun(sun).with_openings(openings)
+        radiance = openings.radiance @ LUMINANCE
+        radiance = np.stack([radiance, np.zeros_like(radiance), CALIBRATION.roughly * radiance], -1).astype(np.float32)
+        openings = replace(openings, radiance=radiance)
+    return unseen_light.with_sun(sun).with_openings(openings)
 
 
 def light_evidence(
     field: LightField, shading: Shading, lit: LitDiffuse, relative_error: np.ndarray, *, threads: int = 0, seed: int = 0
 ) -> LightEvidence:
-    """Check E at some spots and carry what was found over to all elements.
+    """Check E at some elements and carry its error over to all.
 
     Parameters
     ----------
@@ -124,17 +124,17 @@ def light_evidence(
     """
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, LEVELS.sample, seed)
-    again_at = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
-    kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
-    again = [again_at(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
-    a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -CALIBRATION.worst, CALIBRATION.worst) for E in again)
+    gather = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
+    log_E = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
+    gathered = [gather(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
+    a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - log_E, -CALIBRATION.worst, CALIBRATION.worst) for E in gathered)
     noise = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
-    hidden = unsure_light(field, shading, lit, relative_error)
+    unseen_light = unsure_light(field, shading, lit, relative_error)
     shares = np.zeros((len(chosen), 3), np.float32)
-    if hidden.radiance.any() or hidden.environment.radiance.any() or hidden.sun is not None:
-        part = again_at(hidden, chosen, **SHARE_RAYS, seed=seed + 7)[0]
-        shares = np.clip(part / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
+    if unseen_light.radiance.any() or unseen_light.environment.radiance.any() or unseen_light.sun is not None:
+        unseen_E = gather(unseen_light, chosen, **SHARE_RAYS, seed=seed + 7)[0]
+        shares = np.clip(unseen_E / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
     return LightEvidence(
         noise=noise[nearest].astype(np.float32),
         unseen=shares[nearest, 0].astype(np.float32),
@@ -157,12 +157,13 @@ def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         log(E checked / E) of both checks.
     """
     result = np.empty(len(group))
-    of_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}
-    for one, own in by_number(group).items():
-        count = len(own)
-        whole = of_kind[one % 2]
-        result[own] = np.sqrt(
-            (count * _variance(a[own], b[own]) + CALIBRATION.prior_spots * whole) / (count + CALIBRATION.prior_spots)
+    by_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}
+    for number, indices in by_number(group).items():
+        count = len(indices)
+        prior = by_kind[number % 2]
+        result[indices] = np.sqrt(
+            (count * _variance(a[indices], b[indices]) + CALIBRATION.prior_spots * prior)
+            / (count + CALIBRATION.prior_spots)
         )
     return result
 
@@ -171,5 +172,5 @@ def _variance(a: np.ndarray, b: np.ndarray) -> float:
     """What a and b have in common, less their own noise; at least 0."""
     if not len(a):
         return 0.0
-    together = np.quantile(np.abs(np.concatenate([a, b])), ONE_SIGMA) ** 2
-    return max(float(together - np.quantile(np.abs(a - b), ONE_SIGMA) ** 2 / 2), 0.0)
+    total = np.quantile(np.abs(np.concatenate([a, b])), ONE_SIGMA) ** 2
+    return max(float(total - np.quantile(np.abs(a - b), ONE_SIGMA) ** 2 / 2), 0.0)

@@ -51,32 +51,34 @@ class ObjectEvidence:
 
 def object_evidence(atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> list[ObjectEvidence]:
     """One for each object that has elements, by object_id."""
-    return [_one(own, atlas, lit, albedo, texels) for own in by_label(atlas.object_id)]
+    return [_evidence_of(elements, atlas, lit, albedo, texels) for elements in by_label(atlas.object_id)]
 
 
-def _one(own: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> ObjectEvidence:
-    area = atlas.area[own].astype(np.float64)
-    seen, measured = lit.seen[own], albedo.origin[own] == MEASURED
-    whole = max(float(area.sum()), 1e-30)
-    told = own[measured] if measured.any() else own
-    weight = atlas.area[told] / max(float(atlas.area[told].sum()), 1e-30)
-    mean = weight @ albedo.rho[told]
-    error = CALIBRATION.of_object * np.sqrt(weight @ np.square(texels.albedo[told]))
-    shown = own[seen] if seen.any() else own
+def _evidence_of(
+    elements: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence
+) -> ObjectEvidence:
+    area = atlas.area[elements].astype(np.float64)
+    seen, measured = lit.seen[elements], albedo.origin[elements] == MEASURED
+    total = max(float(area.sum()), 1e-30)
+    averaged = elements[measured] if measured.any() else elements
+    weight = atlas.area[averaged] / max(float(atlas.area[averaged].sum()), 1e-30)
+    mean = weight @ albedo.rho[averaged]
+    error = CALIBRATION.of_object * np.sqrt(weight @ np.square(texels.albedo[averaged]))
+    observed = elements[seen] if seen.any() else elements
     return ObjectEvidence(
-        object_id=int(atlas.object_id[own[0]]),
-        area=whole,
-        seen_share=float((area * seen).sum() / whole),
-        measured_share=float((area * measured).sum() / whole),
-        clipped_share=float(texels.clipped[shown].mean()),
-        observations=float(np.median(lit.count[shown])),
-        albedo=_three(mean),
-        albedo_low=_three(np.maximum(mean - Z90 * error, 0)),
-        albedo_high=_three(np.minimum(mean + Z90 * error, 1)),
-        shading_error=float(np.median(texels.shading[shown])),
-        unseen_light=float(texels.unseen[shown].mean()),
+        object_id=int(atlas.object_id[elements[0]]),
+        area=total,
+        seen_share=float((area * seen).sum() / total),
+        measured_share=float((area * measured).sum() / total),
+        clipped_share=float(texels.clipped[observed].mean()),
+        observations=float(np.median(lit.count[observed])),
+        albedo=_rounded(mean),
+        albedo_low=_rounded(np.maximum(mean - Z90 * error, 0)),
+        albedo_high=_rounded(np.minimum(mean + Z90 * error, 1)),
+        shading_error=float(np.median(texels.shading[observed])),
+        unseen_light=float(texels.unseen[observed].mean()),
     )
 
 
-def _three(values: np.ndarray) -> tuple[float, float, float]:
+def _rounded(values: np.ndarray) -> tuple[float, float, float]:
     return rgb(round(float(x), 5) for x in values)

@@ -25,7 +25,7 @@ ROWS: Shown[int] = 80
 """Objects in the table; materials.json lists them all."""
 
 
-def make_page(found: Findings, evidence: Evidence, report: dict[str, Any]) -> str:
+def make_page(findings: Findings, evidence: Evidence, report: dict[str, Any]) -> str:
     """The page of a finished recovery.
 
     Parameters
@@ -33,15 +33,15 @@ def make_page(found: Findings, evidence: Evidence, report: dict[str, Any]) -> st
     report : dict
         What report.json will hold.
     """
-    name = escape(found.name)
+    name = escape(findings.name)
     parts = [
         f"<h1>{name} <small>recovered by Scan Relight</small></h1>",
         f"<p><b>{escape(TIERS[report['tier']])}</b></p>",
-        _facts(found, report),
+        _facts(findings, report),
         _warnings(report["warnings"]),
-        _pictures(found, evidence),
-        _objects(found, evidence),
-        _lamps(found),
+        _pictures(findings, evidence),
+        _objects(findings, evidence),
+        _lamps(findings),
         "<footer>Intervals are meant to hold the truth nine times out of ten; docs/evidence.md says how that was "
         "measured. The numbers behind this page: report.json, materials.json, coverage.exr, albedo_error.exr, "
         "evidence.exr.</footer>",
@@ -53,16 +53,16 @@ def make_page(found: Findings, evidence: Evidence, report: dict[str, Any]) -> st
     return head + "\n".join(parts) + "</body></html>\n"
 
 
-def _facts(found: Findings, report: dict[str, Any]) -> str:
-    figures, sure = report["figures"], report["figures"]["evidence"]
-    lamps = found.shading.lamps
+def _facts(findings: Findings, report: dict[str, Any]) -> str:
+    figures, errors = report["figures"], report["figures"]["evidence"]
+    lamps = findings.shading.lamps
     hidden = sum(not lamp.seen for lamp in lamps)
-    glossy = sum(m.model.has_lobe for m in found.materials)
+    glossy = sum(m.model.has_lobe for m in findings.materials)
     tiles = [
         (f"{1 - figures['unseen_share']:.0%}", "of the surface seen by a frame; the rest is filled in"),
-        (f"&plusmn;{Z90 * sure.get('albedo_error_median', 1):.0%}", "of an albedo that was measured, in the median"),
-        (f"{sure.get('unseen_light_mean', 0):.0%}", "of the light comes from what no frame saw"),
-        (f"{glossy} of {len(found.materials)}", "objects with a highlight"),
+        (f"&plusmn;{Z90 * errors.get('albedo_error_median', 1):.0%}", "of an albedo that was measured, in the median"),
+        (f"{errors.get('unseen_light_mean', 0):.0%}", "of the light comes from what no frame saw"),
+        (f"{glossy} of {len(findings.materials)}", "objects with a highlight"),
         (f"{len(lamps)}", "lamps" + (f", {hidden} of them solved for" if hidden else "")),
         (
             f"{figures['frames']}",
@@ -77,24 +77,28 @@ def _facts(found: Findings, report: dict[str, Any]) -> str:
 def _warnings(warnings: list[str]) -> str:
     if not warnings:
         return "<p>No warnings.</p>"
-    return '<ul class="warnings">' + "".join(f"<li>{escape(one)}</li>" for one in warnings) + "</ul>"
+    return '<ul class="warnings">' + "".join(f"<li>{escape(warning)}</li>" for warning in warnings) + "</ul>"
 
 
-def _pictures(found: Findings, evidence: Evidence) -> str:
-    names = {i.object_id: i.name for i in found.instances}
-    if not found.frames:
+def _pictures(findings: Findings, evidence: Evidence) -> str:
+    names = {i.object_id: i.name for i in findings.instances}
+    if not findings.frames:
         return "<h2>Frames</h2><p>None; the light is the one stored on the capture's mesh.</p>"
     result = ["<h2>Frames</h2>"]
-    for index in choose_frames(found, FRAMES):
+    for index in choose_frames(findings, FRAMES):
         try:
-            seen = view(found, index)
+            seen = view(findings, index)
         except BadInputError:  # it was readable before; the page is not what to stop for
             continue
-        pictures, worst = pictures_of(found, evidence.texels, seen)
-        told = ", ".join(f"{escape(names.get(i, 'outside'))} {size:.0%}" for i, size in worst)
-        result.append(f"<h3>{escape(found.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
+        pictures, worst = pictures_of(findings, evidence.texels, seen)
+        residuals = ", ".join(f"{escape(names.get(i, 'outside'))} {size:.0%}" for i, size in worst)
+        result.append(
+            f"<h3>{escape(findings.frames[index].name)} <small>worst residuals: {residuals or 'none'}</small></h3>"
+        )
         result.append('<div class="frames">' + "".join(map(_figure, pictures)) + "</div>")
-    chips = "".join(f'<span><i style="background:rgb{one.colour}"></i>{escape(one.name)}</span>' for one in models())
+    chips = "".join(
+        f'<span><i style="background:rgb{model.colour}"></i>{escape(model.name)}</span>' for model in models()
+    )
     return "\n".join(result) + f'<p class="chips">{chips}<span>lighter: glossier</span></p>'
 
 
@@ -106,13 +110,13 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _objects(found: Findings, evidence: Evidence) -> str:
+def _objects(findings: Findings, evidence: Evidence) -> str:
     """A table of the objects, the least certain first."""
-    sure = {one.object_id: one for one in evidence.objects}
-    known = [(m, sure[m.object_id]) for m in found.materials if m.object_id in sure and not m.model.gives_light]
-    known.sort(key=lambda pair: -_relative_width(pair[1]))
-    rows = "".join(_row(m, e) for m, e in known[:ROWS])
-    more = f"<p>{len(known) - ROWS} more are in materials.json.</p>" if len(known) > ROWS else ""
+    by_id = {item.object_id: item for item in evidence.objects}
+    pairs = [(m, by_id[m.object_id]) for m in findings.materials if m.object_id in by_id and not m.model.gives_light]
+    pairs.sort(key=lambda pair: -_relative_width(pair[1]))
+    rows = "".join(_row(m, e) for m, e in pairs[:ROWS])
+    more = f"<p>{len(pairs) - ROWS} more are in materials.json.</p>" if len(pairs) > ROWS else ""
     return (
         "<h2>Objects, the least certain first</h2><table><tr><th></th><th>object</th><th>model</th>"
         "<th>albedo</th><th>roughness</th><th>specular F0</th><th>seen</th><th>remarks</th></tr>"
@@ -120,16 +124,16 @@ def _objects(found: Findings, evidence: Evidence) -> str:
     )
 
 
-def _relative_width(one: ObjectEvidence) -> float:
-    """Half an albedo's interval relative to the albedo."""
-    width = np.mean(one.albedo_high) - np.mean(one.albedo_low)
-    return float(width / 2 / max(float(np.mean(one.albedo)), 0.02))
+def _relative_width(evidence: ObjectEvidence) -> float:
+    """Half the width of an albedo's interval, relative to the albedo."""
+    width = np.mean(evidence.albedo_high) - np.mean(evidence.albedo_low)
+    return float(width / 2 / max(float(np.mean(evidence.albedo)), 0.02))
 
 
 def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
-    bare = m.model.lobe_alone
-    colour = m.f0 if bare and m.f0 else e.albedo
-    albedo = "" if bare else f"{np.mean(e.albedo):.2f} &plusmn; {_relative_width(e):.0%}"
+    lobe_alone = m.model.lobe_alone
+    colour = m.f0 if lobe_alone and m.f0 else e.albedo
+    albedo = "" if lobe_alone else f"{np.mean(e.albedo):.2f} &plusmn; {_relative_width(e):.0%}"
     specular = "coloured" if isinstance(m.f0, tuple) else _interval(m.f0, m.f0_low, m.f0_high)
     roughness = _interval(None if m.alpha is None else float(np.sqrt(m.alpha)), m.roughness_low, m.roughness_high)
     return (
@@ -148,9 +152,9 @@ def _interval(value: float | None, low: float | None, high: float | None) -> str
     return ("unknown" if between else "") + between if value is None else f"{value:.2f}{between}"
 
 
-def _lamps(found: Findings) -> str:
-    names = {i.object_id: i.name for i in found.instances}
-    lamps = found.shading.lamps
+def _lamps(findings: Findings) -> str:
+    names = {i.object_id: i.name for i in findings.instances}
+    lamps = findings.shading.lamps
     if not lamps:
         return "<h2>Lamps</h2><p>None; all light comes from outside.</p>"
     rows = "".join(

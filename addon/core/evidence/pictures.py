@@ -38,39 +38,39 @@ class Picture:
     legend: str = ""
 
 
-def pictures_of(found: Findings, errors: TexelEvidence, view: View) -> tuple[list[Picture], list[tuple[int, float]]]:
+def pictures_of(findings: Findings, errors: TexelEvidence, view: View) -> tuple[list[Picture], list[tuple[int, float]]]:
     """Pictures of a frame, and its worst residuals: (object_id, mean relative residual) from the worst on."""
-    element, nothing = view.element, view.element < 0
-    shown = np.maximum(element, 0)
-    albedo, shading = found.albedo.rho, found.irradiance
-    middle = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
-    emitters = np.isin(view.object_id, list(found.emitters))
+    element, empty = view.element, view.element < 0
+    index = np.maximum(element, 0)
+    albedo, shading = findings.albedo.rho, findings.irradiance
+    median = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
+    emitters = np.isin(view.object_id, list(findings.emitters))
 
-    relative = errors.albedo[shown].mean(-1) / np.maximum(albedo[shown].mean(-1), 0.02)
+    relative = errors.albedo[index].mean(-1) / np.maximum(albedo[index].mean(-1), 0.02)
     residual = view.residual
     worst = worst_blocks(residual, view.object_id)
-    light = shading[shown]
-    grey = float(np.median(light[~nothing].mean(-1))) if not nothing.all() else 1.0
-    metals = {m.object_id: m.f0 for m in found.materials if m.model.lobe_alone}
-    bare = nothing | emitters | np.isin(view.object_id, list(metals))
-    colour = _where(nothing | emitters, encoded(albedo[shown]))
+    light = shading[index]
+    grey = float(np.median(light[~empty].mean(-1))) if not empty.all() else 1.0
+    metals = {m.object_id: m.f0 for m in findings.materials if m.model.lobe_alone}
+    blank = empty | emitters | np.isin(view.object_id, list(metals))
+    colour = _where(empty | emitters, encoded(albedo[index]))
     for object_id, f0 in metals.items():
         colour[view.object_id == object_id] = encoded(np.array(f0))
-    views = _where(nothing, heat(found.lit_diffuse.count[shown], VIEWS_TOP))
+    views = _where(empty, heat(findings.lit_diffuse.count[index], VIEWS_TOP))
     residual = _boxed(heat(residual, RESIDUAL_TOP), worst)
-    unsure = _where(bare, heat(relative, ERROR_TOP))
+    unsure = _where(blank, heat(relative, ERROR_TOP))
     pictures = [
-        Picture("Frame", photo(view.radiance, middle)),
-        Picture("Predicted from what was recovered", photo(view.predicted, middle)),
+        Picture("Frame", photo(view.radiance, median)),
+        Picture("Predicted from what was recovered", photo(view.predicted, median)),
         Picture("Residual; boxes: the worst", residual, _up_to(f"{RESIDUAL_TOP:.0%}")),
         Picture("Albedo; of metals F0", colour),
         Picture("Albedo's standard error, relative", unsure, _up_to(f"{ERROR_TOP:.0%}")),
-        Picture("Light that arrives (shading)", _where(nothing, photo(light, grey))),
+        Picture("Light that arrives (shading)", _where(empty, photo(light, grey))),
         Picture("Views of each spot", views, _up_to(VIEWS_TOP)),
-        Picture("Model, lighter the glossier", _models(found, view)),
+        Picture("Model, lighter the glossier", _models(findings, view)),
     ]
-    told = [(int(view.object_id[y + BLOCK // 2, x + BLOCK // 2]), size) for y, x, size in worst]
-    return pictures, told
+    objects = [(int(view.object_id[y + BLOCK // 2, x + BLOCK // 2]), size) for y, x, size in worst]
+    return pictures, objects
 
 
 def _up_to(top) -> str:
@@ -84,13 +84,13 @@ def worst_blocks(residual: np.ndarray, object_id: np.ndarray) -> list[tuple[int,
     mean = ndimage.uniform_filter(residual.astype(np.float32), BLOCK, mode="constant")
     half = BLOCK // 2
     mean[:half], mean[-half:], mean[:, :half], mean[:, -half:] = 0, 0, 0, 0
-    found: list[tuple[int, int, float]] = []
-    while len(found) < WORST and mean.max() > 0:
+    blocks: list[tuple[int, int, float]] = []
+    while len(blocks) < WORST and mean.max() > 0:
         y, x = np.unravel_index(np.argmax(mean), mean.shape)
-        found.append((int(y) - half, int(x) - half, float(mean[y, x])))
+        blocks.append((int(y) - half, int(x) - half, float(mean[y, x])))
         mean[object_id == object_id[y, x]] = 0
         mean[max(y - BLOCK, 0) : y + BLOCK, max(x - BLOCK, 0) : x + BLOCK] = 0
-    return found
+    return blocks
 
 
 def _boxed(image: np.ndarray, corners: list[tuple[int, int, float]]) -> np.ndarray:
@@ -100,13 +100,13 @@ def _boxed(image: np.ndarray, corners: list[tuple[int, int, float]]) -> np.ndarr
     return image
 
 
-def _where(nothing: np.ndarray, image: np.ndarray) -> np.ndarray:
-    image[nothing] = NOTHING
+def _where(empty: np.ndarray, image: np.ndarray) -> np.ndarray:
+    image[empty] = NOTHING
     return image
 
 
-def _models(found: Findings, view: View) -> np.ndarray:
+def _models(findings: Findings, view: View) -> np.ndarray:
     image = np.full((*view.object_id.shape, 3), NOTHING, np.uint8)
-    for m in found.materials:
+    for m in findings.materials:
         image[view.object_id == m.object_id] = gloss(m.model.colour, m.alpha)
     return image

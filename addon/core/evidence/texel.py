@@ -42,9 +42,9 @@ def contrast(atlas: Atlas, values: np.ndarray) -> np.ndarray:
     level = np.log(np.maximum(values, 1e-3)).astype(np.float32)
     level -= level.mean()
     sums = []
-    for one in (np.ones_like(level), level, level * level):
+    for moment in (np.ones_like(level), level, level * level):
         image = np.zeros(atlas.size * atlas.size, np.float32)
-        image[atlas.texel] = one
+        image[atlas.texel] = moment
         image = ndimage.uniform_filter(image.reshape(atlas.size, -1), CALIBRATION.around, mode="constant")
         sums.append(image.ravel()[atlas.texel])
     count, total, squares = sums
@@ -71,7 +71,7 @@ def texel_evidence(
     atlas: Atlas,
     lit: LitDiffuse,
     albedo: Albedo,
-    own: np.ndarray,
+    intrinsic: np.ndarray,
     light: LightEvidence,
     materials: list[ObjectMaterial],
     specular: np.ndarray,
@@ -81,17 +81,17 @@ def texel_evidence(
 
     Parameters
     ----------
-    own : (n,) float32
+    intrinsic : (n,) float32
         `without_light`.
     specular : (n, 3) float32
         Part of each element's L_d that was taken out as specular.
     """
-    beside = np.square(light.unsure) + CALIBRATION.light_floor**2
-    shading = np.sqrt(np.square(light.noise) + beside)
-    shrunk = np.sqrt(np.square(CALIBRATION.noise_left * light.noise) + beside)
+    light_variance = np.square(light.unsure) + CALIBRATION.light_floor**2
+    shading = np.sqrt(np.square(light.noise) + light_variance)
+    shrunk = np.sqrt(np.square(CALIBRATION.noise_left * light.noise) + light_variance)
     # What was filled in shares the error of the light on what it was filled in from.
     _, common, _ = by_object(atlas, albedo, shrunk)
-    relative = np.square(own) + np.square(np.where(albedo.origin == MEASURED, shrunk, common))
+    relative = np.square(intrinsic) + np.square(np.where(albedo.origin == MEASURED, shrunk, common))
     gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
     error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
@@ -108,15 +108,15 @@ def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarr
     (n,) float32 each
         0 for objects of which nothing was measured.
     """
-    spread, middle, share = np.zeros((3, len(atlas)), np.float32)
+    spread, median, share = np.zeros((3, len(atlas)), np.float32)
     level = np.log(np.maximum(albedo.rho.mean(1), 1e-3))
-    for own in by_label(atlas.object_id):
-        known = own[albedo.origin[own] == MEASURED]
+    for elements in by_label(atlas.object_id):
+        known = elements[albedo.origin[elements] == MEASURED]
         if len(known):
             low, high = np.quantile(level[known], (0.16, 0.84))
-            spread[own], middle[own] = (high - low) / 2, np.median(value[known])
-            share[own] = atlas.area[known].sum() / max(atlas.area[own].sum(), 1e-30)
-    return spread, middle, share
+            spread[elements], median[elements] = (high - low) / 2, np.median(value[known])
+            share[elements] = atlas.area[known].sum() / max(atlas.area[elements].sum(), 1e-30)
+    return spread, median, share
 
 
 def gloss_error(
@@ -126,12 +126,12 @@ def gloss_error(
     result, elements = np.full(len(atlas), CALIBRATION.left, np.float32), by_number(atlas.object_id)
     for m in materials:
         if m.model.layered:
-            own = elements.get(m.object_id, np.zeros(0, np.int64))
-            taken = np.pi * specular[own].mean(1) / np.maximum(irradiance[own].mean(1), 1e-20)
-            known = albedo.origin[own] == MEASURED
+            indices = elements.get(m.object_id, np.zeros(0, np.int64))
+            taken = np.pi * specular[indices].mean(1) / np.maximum(irradiance[indices].mean(1), 1e-20)
+            known = albedo.origin[indices] == MEASURED
             if known.any():
                 # Where hardly any light comes the ratio is wild; what was filled in came from what was measured.
-                middle = np.median(taken[known])
-                taken = np.where(known, np.minimum(taken, 3 * middle), middle)
-                result[own] = CALIBRATION.poorly * taken + CALIBRATION.left
+                median = np.median(taken[known])
+                taken = np.where(known, np.minimum(taken, 3 * median), median)
+                result[indices] = CALIBRATION.poorly * taken + CALIBRATION.left
     return result

@@ -1,4 +1,4 @@
-"""What a capture's frames tell of radiance: the first thing to know of how far to trust a result."""
+"""How well a capture's frames measure radiance: the first thing to know of how far to trust a result."""
 
 from ..scene.model import AUTO, Capture, Frame
 from ..scene.stored_light import LitTexture
@@ -18,18 +18,18 @@ TIERS = {
 
 
 def tier(capture: Capture) -> str:
-    """The name in `TIERS` of what most of a capture's frames are."""
+    """The name in `TIERS` that most of a capture's frames have."""
     if not capture.frames:
         return "baked" if isinstance(capture.mesh.lit, LitTexture) else "texture"
 
-    told = len({frame.exposure for frame in capture.frames}) > 1
+    exposures_known = len({frame.exposure for frame in capture.frames}) > 1
 
-    def of(frame: Frame) -> str:
+    def name_of(frame: Frame) -> str:
         if frame.brackets:
             return "brackets"
         if frame.transfer != AUTO:
             return "curve" if frame.transfer else "hdr"
-        return "exposures" if told else "codes"
+        return "exposures" if exposures_known else "codes"
 
-    found = [of(frame) for frame in capture.frames]
-    return max(TIERS, key=found.count)
+    names = [name_of(frame) for frame in capture.frames]
+    return max(TIERS, key=names.count)

@@ -27,12 +27,12 @@ FUSE = (
 )
 
 
-def read_pose(told: Sequence[Any], name: str) -> np.ndarray:
+def read_pose(values: Sequence[Any], name: str) -> np.ndarray:
     """Camera to world, +Z up, of a quaternion x, y, z, w and a position.
 
     Parameters
     ----------
-    told : seven values
+    values : seven values
         Of `name`, a frame.
 
     Returns
@@ -45,11 +45,11 @@ def read_pose(told: Sequence[Any], name: str) -> np.ndarray:
     BadInputError
         They are no seven finite numbers, or the quaternion is 0.
     """
-    if len(told) != 7 or not all(map(is_number, told)) or not any(told[:4]):
+    if len(values) != 7 or not all(map(is_number, values)) or not any(values[:4]):
         raise BadInputError(f"Frame '{name}' has a pose that is no quaternion and place; export the recording again.")
     pose = np.eye(4)
-    pose[:3, :3] = rotation_of(np.array([told[3], *told[:3]], np.float64))
-    pose[:3, 3] = told[4:]
+    pose[:3, :3] = rotation_of(np.array([values[3], *values[:3]], np.float64))
+    pose[:3, 3] = values[4:]
     return TO_Z_UP @ check_pose(pose, name)
 
 

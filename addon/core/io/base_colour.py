@@ -103,20 +103,20 @@ def _of_obj(path: Path) -> list[StoredPicture | None]:
     libraries: list[bytes] = []
     with readable(f"Mesh '{path}'", "check its rights"), open(path, "rb") as file:
         while line := file.readline(BLOCK):
-            if told := OBJ_MATERIAL.match(line):
-                used[told[1]] = None
-            elif told := LIBRARY.match(line):
-                libraries.append(told[1])
+            if match := OBJ_MATERIAL.match(line):
+                used[match[1]] = None
+            elif match := LIBRARY.match(line):
+                libraries.append(match[1])
     pictures: dict[bytes, StoredPicture] = {}
     for library in dict.fromkeys(libraries):
         name = b""
         file_of = beside(path, library.decode("utf-8", "replace"), "material library")
         for line in read_bytes(file_of, most=MAX_MTL).splitlines():
-            if told := NEW.match(line):
-                name = told[1]
-            elif name in used and (told := PICTURE.match(line)):
+            if match := NEW.match(line):
+                name = match[1]
+            elif name in used and (match := PICTURE.match(line)):
                 # Options come before the name, which alone may hold spaces.
-                text = told[1].decode("utf-8", "replace")
+                text = match[1].decode("utf-8", "replace")
                 text = text.split()[-1] if text.startswith("-") else text
                 pictures[name] = StoredPicture(beside(path, text.replace("\\", "/"), "texture"))
     return [pictures.get(name) for name in used]

@@ -64,9 +64,9 @@ def merge(shots: Iterable[Exposed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     for shot in itertools.chain((first,), shots):
         good = shot.usable & ~shot.clipped
         with np.errstate(over="ignore", invalid="ignore"):
-            own = shot.rgb / np.float32(shot.exposure)
-        here = good | (shot.usable & ~valid)  # a longer exposure that is not clipped, or the first that says anything
-        radiance[here] = own[here]
+            estimate = shot.rgb / np.float32(shot.exposure)
+        takes = good | (shot.usable & ~valid)  # a longer exposure that is not clipped, or the first that says anything
+        radiance[takes] = estimate[takes]
         exact |= good
         valid |= shot.usable
         peak = np.where(good, shot.rgb.max(-1), 0)
@@ -123,16 +123,16 @@ def unfold(frames: Sequence[Frame]) -> list[Frame]:
 
 def fold(frames: Sequence[Frame], exposures: Sequence[Frame]) -> list[Frame]:
     """Undo `unfold`: `frames` with what their `exposures` have become."""
-    found, at = [], 0
+    result, at = [], 0
     for frame in frames:
         end = at + 1 + len(frame.brackets)
-        found.append(_lead(exposures[at], exposures[at + 1 : end]))
+        result.append(_lead(exposures[at], exposures[at + 1 : end]))
         at = end
-    return found
+    return result
 
 
 def _lead(frame: Frame, others: Sequence[Frame]) -> Frame:
-    return replace(frame, brackets=(*frame.brackets, *(shot for one in others for shot in one.shots)))
+    return replace(frame, brackets=(*frame.brackets, *(shot for other in others for shot in other.shots)))
 
 
 def _key(frame: Frame) -> tuple:

@@ -23,7 +23,7 @@ STRONGEST: Limit[float] = 1e9
 """Bound of a lens's coefficients; those of a telephoto lens's high powers are large."""
 
 
-def pinhole(told: Any, names: Sequence[str], path: Path) -> Camera:
+def pinhole(entry: Any, names: Sequence[str], path: Path) -> Camera:
     """The camera, without a pose, of which a JSON object tells width, height, fx, fy, cx and cy under some `names`.
 
     Raises
@@ -31,13 +31,13 @@ def pinhole(told: Any, names: Sequence[str], path: Path) -> Camera:
     BadInputError
         One is missing or can't be; `path` is the file.
     """
-    found = numbers(told, names)
-    if found is None or min(found[:4]) <= 0 or any(value != int(value) for value in found[:2]):
+    values = numbers(entry, names)
+    if values is None or min(values[:4]) <= 0 or any(value != int(value) for value in values[:2]):
         raise BadInputError(
             f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0 or no whole "
             "pixels; mend it."
         )
-    width, height, fx, fy, cx, cy = found
+    width, height, fx, fy, cx, cy = values
     return Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
 
 
@@ -83,7 +83,7 @@ def _numbers(lens: object) -> Iterator[float]:
         for field in dataclasses.fields(lens):
             yield from _numbers(getattr(lens, field.name))
     elif isinstance(lens, tuple):
-        for one in lens:
-            yield from _numbers(one)
+        for item in lens:
+            yield from _numbers(item)
     elif isinstance(lens, (int, float)) and not isinstance(lens, bool):
         yield lens if math.isfinite(lens) else math.inf

@@ -45,14 +45,14 @@ class _Pile(NamedTuple):
 def _pile(pictures: Sequence[np.ndarray], level: np.ndarray) -> _Pile:
     """Count around `level` ((k,), a number for each of the k pictures, (m, 3) each)."""
     patterns, frames, below, others = np.zeros(8, int), [], 0, []
-    for values, own in zip(pictures, level):
-        near = values[values.max(1) >= own * (1 - 11 * WIDTH)]
-        at = near >= own * (1 - WIDTH)
+    for values, frame_level in zip(pictures, level):
+        near = values[values.max(1) >= frame_level * (1 - 11 * WIDTH)]
+        at = near >= frame_level * (1 - WIDTH)
         clipped = at.any(1)
         frames.append(int(clipped.sum()))
         below += int((~clipped).sum())
         patterns += np.bincount(at[clipped] @ np.array([1, 2, 4]), minlength=8)
-        others.append(near[clipped][~at[clipped]] / own)
+        others.append(near[clipped][~at[clipped]] / frame_level)
     return _Pile(np.array(frames), below, patterns, len(np.unique(np.concatenate(others).round(3))))
 
 
@@ -101,20 +101,20 @@ def find_clipping(frames: Sequence[Frame], read: Callable[[Path], np.ndarray]) -
         return frames, []
     tops = np.array(top)
     none = np.ones(len(top))
-    found = []
-    ways = [(none, exposure, "")] + ([(exposure, none, " times the exposure")] if np.ptp(exposure) > 0 else [])
-    for scale, told, what in ways:
+    piles = []
+    scalings = [(none, exposure, "")] + ([(exposure, none, " times the exposure")] if np.ptp(exposure) > 0 else [])
+    for scale, known_exposure, what in scalings:
         level = float((tops / scale).max())
         pile = _pile(pictures, level * scale)
-        if level > 0 and _is_clipped(pile, told):
-            found.append((int(pile.frames.sum()), level, what))
-    if not found:
+        if level > 0 and _is_clipped(pile, known_exposure):
+            piles.append((int(pile.frames.sum()), level, what))
+    if not piles:
         return frames, []
     # Of the frame that reaches the greater value by the wrong scale alone, the pile is there as well, but smaller.
-    _, level, what = max(found)
-    own = [level * (frame.exposure if what else 1.0) * (1 - WIDTH) for frame in frames]
+    _, level, what = max(piles)
+    saturations = [level * (frame.exposure if what else 1.0) * (1 - WIDTH) for frame in frames]
     note = (
         f"The frames clip at {level:.4g}{what}, as their values pile up there; what is that bright counts as a "
         "lower bound. Give `saturation` in the poses' file if this is wrong."
     )
-    return tuple(replace(frame, saturation=s) for frame, s in zip(frames, own)), [note]
+    return tuple(replace(frame, saturation=s) for frame, s in zip(frames, saturations)), [note]

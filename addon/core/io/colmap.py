@@ -99,7 +99,7 @@ def frames_of(
         seen.add(image.name)
         return made
 
-    frames, problems = usable(frame, sorted(model.images, key=lambda one: one.name))
+    frames, problems = usable(frame, sorted(model.images, key=lambda image: image.name))
     return frames, problems, _notes(model, frames)
 
 
@@ -145,9 +145,9 @@ def _frame(image: ColmapImage, name: str, camera: Camera, root: Path, folder: Pa
     path = next((hdr for hdr in map(named.with_suffix, HDR) if hdr.is_file()), named)
     masks = []
     if named.is_relative_to(folder):
-        usual = folder.parent / MASKS / named.relative_to(folder)
+        mask = folder.parent / MASKS / named.relative_to(folder)
         # COLMAP's own convention: the picture's whole name, and .png after it.
-        masks = [usual.with_name(f"{usual.name}.png"), usual.with_suffix(".png")]
+        masks = [mask.with_name(f"{mask.name}.png"), mask.with_suffix(".png")]
     return Frame(name, path, camera, next(filter(Path.is_file, masks), None))
 
 

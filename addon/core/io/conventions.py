@@ -109,27 +109,27 @@ def parse(text: str) -> Convention:
     BadInputError
         It can't be read.
     """
-    found = Convention()
+    convention = Convention()
     for part in filter(None, (p.strip() for p in text.split(","))):
         part = NAMED.get(part, part)
         kind, _, value = part.partition(":")
         if part == AS_READ:
             continue
         if part == "world-to-camera":
-            found = replace(found, world_to_camera=True)
+            convention = replace(convention, world_to_camera=True)
         elif kind in ("camera", "world") and re.fullmatch(r"([+-][xyz]){3}", value) and value in all_axes():
-            found = replace(found, camera=value) if kind == "camera" else replace(found, world=value)
+            convention = replace(convention, camera=value) if kind == "camera" else replace(convention, world=value)
         elif kind == "up" and re.fullmatch(r"[+-][xyz]", value):
-            found = replace(found, up=value)
+            convention = replace(convention, up=value)
         elif kind == "scale" and _positive(value):
-            found = replace(found, scale=float(value))
+            convention = replace(convention, scale=float(value))
         else:
             raise BadInputError(
                 f"Convention '{text}' can't be read at '{part}'; join parts such as opencv, "
                 "world-to-camera, camera:+x-y-z, world:+x-z+y, up:+y or scale:0.01 by commas "
                 "(axes must make a rotation)."
             )
-    return found
+    return convention
 
 
 def _positive(text: str) -> bool:

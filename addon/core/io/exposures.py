@@ -46,12 +46,12 @@ def settings_of(entry: dict[str, Any], name: str) -> Settings | None:
     BadInputError
         One of them is no number above 0.
     """
-    told = {_plain(key): key for key, value in entry.items() if isinstance(key, str) and value not in (None, "")}
-    found = []
+    key_of = {_plain(key): key for key, value in entry.items() if isinstance(key, str) and value not in (None, "")}
+    values = []
     for keys in (TIME, F_NUMBER, ISO):
-        key = next((told[key] for key in keys if key in told), None)
-        found.append(None if key is None else parse_number(entry[key], key, name))
-    return Settings(*found) if any(value is not None for value in found) else None
+        key = next((key_of[key] for key in keys if key in key_of), None)
+        values.append(None if key is None else parse_number(entry[key], key, name))
+    return Settings(*values) if any(value is not None for value in values) else None
 
 
 def _plain(key: str) -> str:
@@ -73,8 +73,8 @@ def parse_number(value: Any, key: str, name: str) -> float:
     except (TypeError, ValueError, ArithmeticError):
         pass
     if not 0 < number < math.inf:
-        shown = repr(value) if len(repr(value)) < 40 else repr(value)[:40] + "..."
-        raise BadInputError(f"Frame '{name}' has {key} = {shown}; give a number above 0.")
+        excerpt = repr(value) if len(repr(value)) < 40 else repr(value)[:40] + "..."
+        raise BadInputError(f"Frame '{name}' has {key} = {excerpt}; give a number above 0.")
     return number
 
 
@@ -83,14 +83,14 @@ def relative(settings: Sequence[Settings | None]) -> list[float | None]:
 
     A setting that no frame tells is the same for all.
     """
-    known = [one for one in settings if one is not None]
-    told = [any(one[i] is not None for one in known) for i in range(3)]
+    known = [entry for entry in settings if entry is not None]
+    stated = [any(entry[i] is not None for entry in known) for i in range(3)]
     values: list[float | None] = []
-    for one in settings:
-        if one is None or any(wanted and value is None for wanted, value in zip(told, one)):
+    for entry in settings:
+        if entry is None or any(wanted and value is None for wanted, value in zip(stated, entry)):
             values.append(None)
             continue
-        time, f_number, iso = (1.0 if value is None else value for value in one)
+        time, f_number, iso = (1.0 if value is None else value for value in entry)
         value = time * iso / f_number / f_number  # not its square, which may be 0
         values.append(value if 0 < value < math.inf else None)
     median = float(np.median([value for value in values if value is not None] or [1.0]))
@@ -186,20 +186,20 @@ def from_csv(frames: Sequence[Frame], path: Path) -> tuple[list[Frame], list[str
             f"'{path}' has {len(unknown)} lines for frames that the capture has not, such as '{unknown[0]}'; "
             "they are passed over."
         )
-    kept = [frames[i] for i in sorted(used)]
+    used_frames = [frames[i] for i in sorted(used)]
     entries = [used[i] for i in sorted(used)]
     if entries and EXPOSURE in entries[0]:
-        kept = [
+        used_frames = [
             replace(frame, exposure=parse_number(entry[EXPOSURE], EXPOSURE, frame.name))
-            for frame, entry in zip(kept, entries)
+            for frame, entry in zip(used_frames, entries)
         ]
-        values = [frame.exposure for frame in kept]
+        values = [frame.exposure for frame in used_frames]
         if max(values) > WIDEST * min(values):
             raise BadInputError(f"'{path}' holds exposures from {min(values):g} to {max(values):g}; give factors.")
-        return kept, problems, notes
-    settings = [settings_of(entry, frame.name) for frame, entry in zip(kept, entries)]
-    kept, more = from_settings(kept, settings, f"'{path.name}'")
-    return kept, problems, notes + more
+        return used_frames, problems, notes
+    settings = [settings_of(entry, frame.name) for frame, entry in zip(used_frames, entries)]
+    used_frames, more = from_settings(used_frames, settings, f"'{path.name}'")
+    return used_frames, problems, notes + more
 
 
 def _table(path: Path) -> dict[str, dict[str, str]]:

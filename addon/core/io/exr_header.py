@@ -225,19 +225,19 @@ def _level_sizes(size: int, up: int) -> list[int]:
 
 def _strings(data: bytes) -> tuple[str, ...]:
     """A vector of strings, each with its length before it."""
-    found, at = [], 0
+    strings, at = [], 0
     while at + 4 <= len(data):
         (length,) = struct.unpack_from("<i", data, at)
         if length < 0 or at + 4 + length > len(data):
             raise _Damaged("has a damaged attribute 'multiView'")
-        found.append(data[at + 4 : at + 4 + length].decode("latin-1"))
+        strings.append(data[at + 4 : at + 4 + length].decode("latin-1"))
         at += 4 + length
-    return tuple(found)
+    return tuple(strings)
 
 
 def _attributes(head: bytes, at: int) -> tuple[dict[str, bytes], int]:
     """The attributes by name of the header at `at`, and the position behind them."""
-    found: dict[str, bytes] = {}
+    attributes: dict[str, bytes] = {}
     while head[at]:
         name, at = _text(head, at)
         _, at = _text(head, at)
@@ -247,9 +247,9 @@ def _attributes(head: bytes, at: int) -> tuple[dict[str, bytes], int]:
             raise _Damaged("has a damaged header")
         if at + length > len(head):
             raise IndexError
-        found.setdefault(name, head[at : at + length])
+        attributes.setdefault(name, head[at : at + length])
         at += length
-    return found, at + 1
+    return attributes, at + 1
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:

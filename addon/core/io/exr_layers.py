@@ -62,8 +62,8 @@ def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, 
         if header.view in ("", view)
         for layer in _layers(i, header, len(headers) > 1)
     ]
-    others = {name for header in headers for name in header.views[1:]}
-    layers = [layer for layer in layers if layer.name.split(".")[-1] not in others]
+    other_views = {name for header in headers for name in header.views[1:]}
+    layers = [layer for layer in layers if layer.name.split(".")[-1] not in other_views]
     if not layers:
         names = ", ".join(sorted(name for header in headers for name in header.channels)[:6])
         raise BadInputError(f"Picture '{path}' holds the channels {names}; write it with R, G and B.")
@@ -75,12 +75,12 @@ def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, 
             "write that one alone, or name it 'beauty'."
         )
     chosen = ranked[0] if ranked else layers[0]
-    told = []
+    choices = []
     if len(views) > 1:
-        told.append(f"of the views {', '.join(views)}, '{view or views[0]}'")
+        choices.append(f"of the views {', '.join(views)}, '{view or views[0]}'")
     if len(layers) > 1 and chosen.name:
-        told.append(f"of {len(layers)} layers, '{chosen.name}'")
-    return chosen, " and ".join(told)
+        choices.append(f"of {len(layers)} layers, '{chosen.name}'")
+    return chosen, " and ".join(choices)
 
 
 def _rank(layer: ExrLayer) -> int:
@@ -94,12 +94,14 @@ def _layers(part: int, header: ExrHeader, several: bool) -> list[ExrLayer]:
     for channel in header.channels:
         layer, _, base = channel.rpartition(".")
         by_layer.setdefault(layer, {})[base.upper()] = channel
-    own = header.name if several else ""
-    if header.view and own.lower().endswith("." + header.view.lower()):
-        own = own[: -len(header.view) - 1]
-    found = []
+    part_name = header.name if several else ""
+    if header.view and part_name.lower().endswith("." + header.view.lower()):
+        part_name = part_name[: -len(header.view) - 1]
+    layers = []
     for layer, bases in by_layer.items():
         colour = next((kind for kind in (RGB, CHROMA, GRAY) if all(base in bases for base in kind)), None)
         if colour is not None:
-            found.append(ExrLayer(part, header, layer or own, tuple(bases[base] for base in colour), bases.get("A")))
-    return found
+            layers.append(
+                ExrLayer(part, header, layer or part_name, tuple(bases[base] for base in colour), bases.get("A"))
+            )
+    return layers

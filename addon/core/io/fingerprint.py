@@ -36,8 +36,8 @@ def fingerprint(capture: Capture) -> str:
                 add(getattr(value, field.name))
         elif isinstance(value, (tuple, list)):
             digest.update(f"({len(value)}".encode())
-            for one in value:
-                add(one)
+            for item in value:
+                add(item)
         else:
             digest.update(f"{value!r};".encode("utf-8", "surrogatepass"))
 

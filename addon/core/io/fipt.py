@@ -38,12 +38,12 @@ def _read(
     """The layout of a capture whose pictures lie in `folder`: what is told of each of its `cameras` makes it."""
     mesh = read_mesh(reading.mesh or root / MESH, reading)
 
-    def frame(index: int, told: Any) -> Frame:
+    def frame(index: int, entry: Any) -> Frame:
         name = f"{index:03d}"
         path, ids = folder / "Image" / f"{name}_0001.exr", folder / "segmentation" / f"{name}.exr"
-        return Frame(name, path, make(told, path, name), id_path=ids if ids.is_file() else None)
+        return Frame(name, path, make(entry, path, name), id_path=ids if ids.is_file() else None)
 
-    frames, problems = usable(lambda one: frame(*one), enumerate(cameras))
+    frames, problems = usable(lambda item: frame(*item), enumerate(cameras))
     return Layout(frames, mesh, problems=problems)
 
 
@@ -87,8 +87,8 @@ def read_real(root: Path, reading: Reading) -> Layout:
             " export both again."
         )
 
-    def camera(told: tuple[np.ndarray, np.ndarray], picture: Path, name: str) -> Camera:
-        (origin, target, up), k = told
+    def camera(view: tuple[np.ndarray, np.ndarray], picture: Path, name: str) -> Camera:
+        (origin, target, up), k = view
         width, height = picture_size(picture)
         fx, fy, cx, cy = (float(k[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
         if not (np.isfinite(k).all() and fx > 0 and fy > 0):

@@ -58,9 +58,9 @@ def is_result(folder: Path) -> bool:
 def capture_name(result: Path) -> str:
     """Name of the capture that a result was made from; its folder's own where it does not tell."""
     for name in (MATERIALS, REPORT):
-        told = json_if_sound(result / name).get("capture")
-        if isinstance(told, str) and told:
-            return told
+        capture = json_if_sound(result / name).get("capture")
+        if isinstance(capture, str) and capture:
+            return capture
     return result.name
 
 
@@ -74,22 +74,24 @@ def look_into(folder: Path | str) -> Content:
     if is_capture(folder):
         return Content(CAPTURE, folder, name=name)
     if is_result(folder):
-        of = capture_name(folder)
-        return Content(RESULT, folder, f"This is a finished result of '{of}', not a scan.", of, results=(folder,))
+        capture = capture_name(folder)
+        return Content(
+            RESULT, folder, f"This is a finished result of '{capture}', not a scan.", capture, results=(folder,)
+        )
     try:
-        inside = sorted(os.scandir(folder), key=lambda one: one.name.lower())
+        inside = sorted(os.scandir(folder), key=lambda entry: entry.name.lower())
     except OSError as error:
         return Content(
             OTHER, folder, f"Folder '{name}' can't be read ({error.strerror or error}); check its rights.", name
         )
     if not inside:
         return Content(EMPTY, folder, f"Folder '{name}' is empty; choose the folder of a scan.", name)
-    below = [Path(one.path) for one in inside[:LOOKED_AT] if not one.name.startswith(".") and one.is_dir()]
-    captures = [one for one in below if is_capture(one)]
-    results = [one for one in below if is_result(one)]
+    below = [Path(entry.path) for entry in inside[:LOOKED_AT] if not entry.name.startswith(".") and entry.is_dir()]
+    captures = [path for path in below if is_capture(path)]
+    results = [path for path in below if is_result(path)]
     if captures or results:
         what = " and ".join(
-            _count(found, word) for found, word in ((captures, "scan"), (results, "finished result")) if found
+            _count(paths, word) for paths, word in ((captures, "scan"), (results, "finished result")) if paths
         )
         return Content(
             WAY,
@@ -99,10 +101,10 @@ def look_into(folder: Path | str) -> Content:
             tuple(captures[:OFFERED]),
             tuple(results[:OFFERED]),
         )
-    above = [one for one in list(folder.absolute().parents)[:ABOVE] if is_capture(one)]
+    above = [path for path in list(folder.absolute().parents)[:ABOVE] if is_capture(path)]
     if above:
         return Content(WAY, folder, f"Folder '{name}' is a part of the scan '{above[-1].name}'.", name, (above[-1],))
-    return Content(OTHER, folder, _other(name, [one.name for one in inside]), name)
+    return Content(OTHER, folder, _other_sentence(name, [entry.name for entry in inside]), name)
 
 
 def of_path(path: Path | str) -> Content:
@@ -116,7 +118,7 @@ def of_path(path: Path | str) -> Content:
     if path.name in (MATERIALS, SCENE, REPORT, "report.html") and is_result(path.parent):
         return look_into(path.parent)
     if path.suffix.lower() in (".json", ".ply", ".obj", ".glb", ".gltf", ".bin", ".txt", ".csv", *VIDEOS):
-        begins = [one for one in (path.parent, *list(path.absolute().parents)[1:ABOVE]) if is_capture(one)]
+        begins = [folder for folder in (path.parent, *list(path.absolute().parents)[1:ABOVE]) if is_capture(folder)]
         if begins and not (path.suffix.lower() == ".json" and not _is_ours(path)):
             return look_into(begins[-1])
     return Content(
@@ -133,16 +135,16 @@ def _is_ours(path: Path) -> bool:
     return path.name.startswith(("transforms", "info_semantic", "cam_params", "segments", "mesh_info", "metadata"))
 
 
-def _count(found: list[Path], word: str) -> str:
-    return f"one {word} is" if len(found) == 1 else f"{len(found)} {word}s are"
+def _count(paths: list[Path], word: str) -> str:
+    return f"one {word} is" if len(paths) == 1 else f"{len(paths)} {word}s are"
 
 
-def _other(name: str, names: list[str]) -> str:
-    endings = [Path(one).suffix.lower() for one in names]
-    blend = next((one for one, ending in zip(names, endings, strict=True) if ending == ".blend"), None)
+def _other_sentence(name: str, names: list[str]) -> str:
+    endings = [Path(file).suffix.lower() for file in names]
+    blend = next((file for file, ending in zip(names, endings, strict=True) if ending == ".blend"), None)
     if blend:
         return f"Folder '{name}' holds the Blender file '{blend}' and no scan; open that by File, Open."
-    film = next((one for one, ending in zip(names, endings, strict=True) if ending in VIDEOS), None)
+    film = next((file for file, ending in zip(names, endings, strict=True) if ending in VIDEOS), None)
     if film:
         return (
             f"Folder '{name}' holds the video '{film}', which has no poses; find them and its frames "

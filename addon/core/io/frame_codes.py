@@ -26,23 +26,23 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
         There is no such curve.
     """
     check_transfer(transfer)
-    found: list[Frame] = []
+    result: list[Frame] = []
     problems = []
     depths = [_bits(frame) for frame in frames]
     coded = sum(any(bits) for bits in depths)
     transfer = transfer or (AUTO if coded == sum(map(bool, depths)) else "")
     for frame, bits in zip(frames, depths):
         if not any(bits):
-            found.append(frame)
+            result.append(frame)
             continue
         if not transfer:
             problems.append(unstated(frame.path))
             continue
-        limits = [clip_level(one, transfer) if one else float("inf") for one in bits]
+        limits = [clip_level(depth, transfer) if depth else float("inf") for depth in bits]
         shots = tuple(
             replace(shot, saturation=min(shot.saturation, limit)) for shot, limit in zip(frame.brackets, limits[1:])
         )
-        found.append(replace(frame, transfer=transfer, saturation=min(frame.saturation, limits[0]), brackets=shots))
+        result.append(replace(frame, transfer=transfer, saturation=min(frame.saturation, limits[0]), brackets=shots))
     notes = []
     if coded and transfer == AUTO:
         notes.append(
@@ -55,7 +55,7 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
             f"{coded} of {len(frames)} frames are pictures of 8 or 16 bits, decoded by the curve '{transfer}';"
             " where a camera or a program applied another (tone mapping), the light comes out wrong."
         )
-    return found, problems, notes
+    return result, problems, notes
 
 
 def _bits(frame: Frame) -> list[int]:

@@ -55,19 +55,19 @@ def placed_meshes(nodes: list[dict[str, Any]], meshes: int, path: Path) -> list[
     open_ = [i for i in range(len(nodes)) if parent[i] < 0]
     while open_:
         i = open_.pop()
-        own = _matrix(nodes[i], path)
-        world[i] = own if parent[i] < 0 else world[int(parent[i])] @ own
+        local = _matrix(nodes[i], path)
+        world[i] = local if parent[i] < 0 else world[int(parent[i])] @ local
         open_ += nodes[i].get("children", [])
     if len(world) < len(nodes):  # a circle
         raise damaged
-    found = []
+    placed = []
     for i, node in enumerate(nodes):
         if "mesh" in node:
             if not is_index(node["mesh"], meshes):
                 raise damaged
             name = node.get("name")
-            found.append(Placed(node["mesh"], name if isinstance(name, str) else "", TO_Z_UP @ world[i] @ TO_Z_UP.T))
-    return found
+            placed.append(Placed(node["mesh"], name if isinstance(name, str) else "", TO_Z_UP @ world[i] @ TO_Z_UP.T))
+    return placed
 
 
 def is_index(value: Any, count: int) -> bool:
@@ -96,9 +96,9 @@ def _matrix(node: dict[str, Any], path: Path) -> np.ndarray:
 
 def _numbers(value: Any, count: int, path: Path) -> np.ndarray:
     try:
-        found = np.array(value, np.float64)
+        numbers = np.array(value, np.float64)
     except (TypeError, ValueError, OverflowError):
-        found = np.zeros(0)
-    if found.shape != (count,) or not (np.abs(found) < 1e30).all():
+        numbers = np.zeros(0)
+    if numbers.shape != (count,) or not (np.abs(numbers) < 1e30).all():
         raise BadInputError(f"Mesh '{path}' has a node whose place is not finite numbers; export it again.")
-    return found
+    return numbers

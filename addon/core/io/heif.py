@@ -44,8 +44,8 @@ def heif_header(path: Path) -> Header:
 def heif_exif(path: Path) -> bytes:
     """The EXIF of `path`, a TIFF; empty where it has none. Raises as `heif_header`."""
     with decoding(path):
-        found = _open(path).info.get("exif") or b""
-        return found.removeprefix(b"Exif\0\0")
+        data = _open(path).info.get("exif") or b""
+        return data.removeprefix(b"Exif\0\0")
 
 
 def heif_orientation(path: Path) -> int:

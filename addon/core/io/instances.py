@@ -29,8 +29,8 @@ def read_instances(path: Path) -> dict[int, str]:
     objects, classes = value.get("objects"), value.get("classes", [])
     if not isinstance(objects, list):
         raise BadInputError(f"'{path}' has no list 'objects'; export it again or take it away.")
-    known = [one for one in classes if isinstance(one, dict)] if isinstance(classes, list) else []
-    class_names = {one["id"]: one.get("name") for one in known if isinstance(one.get("id"), int)}
+    known = [entry for entry in classes if isinstance(entry, dict)] if isinstance(classes, list) else []
+    class_names = {entry["id"]: entry.get("name") for entry in known if isinstance(entry.get("id"), int)}
     names: dict[int, str] = {}
     for i, item in enumerate(objects):
         number = item.get("id") if isinstance(item, dict) else None

@@ -115,7 +115,7 @@ class Layout:
     mirrors: list[KnownMirror] = field(default_factory=list)
 
 
-def usable(make: Callable[[Any], Frame], told: Iterable[Any]) -> tuple[list[Frame], list[str]]:
+def usable(make: Callable[[Any], Frame], entries: Iterable[Any]) -> tuple[list[Frame], list[str]]:
     """The frames that `make` makes of what is told of each, in their order, and a sentence on each that can't be made.
 
     Raises
@@ -124,9 +124,9 @@ def usable(make: Callable[[Any], Frame], told: Iterable[Any]) -> tuple[list[Fram
         A path leads out of the capture: no slip of one frame.
     """
     frames, problems = [], []
-    for one in told:
+    for entry in entries:
         try:
-            frames.append(make(one))
+            frames.append(make(entry))
         except EscapesError:
             raise
         except BadInputError as error:

@@ -48,15 +48,15 @@ def find_mesh(root: Path, reading: Reading, names: Sequence[str] = (MESH,), reme
     """
     if reading.mesh is not None:
         return reading.mesh
-    for usual in (root / name for name in names):
-        if usual.exists():
-            return usual
-    found = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
-    if len(found) == 1:
-        return found[0]
-    if found:
+    for path in (root / name for name in names):
+        if path.exists():
+            return path
+    paths = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
+    if len(paths) == 1:
+        return paths[0]
+    if paths:
         raise BadInputError(
-            f"Capture '{root}' has several meshes ({', '.join(p.name for p in found[:3])}, ...); name one with --mesh."
+            f"Capture '{root}' has several meshes ({', '.join(p.name for p in paths[:3])}, ...); name one with --mesh."
         )
     if remedy:
         raise BadInputError(f"Capture '{root}' has no mesh; {remedy}")

@@ -68,18 +68,20 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
     notes: list[str] = []
     for path in find(root) or [root / FILE]:
         top = read_json(path)
-        told = top.get("frames")
-        if not isinstance(told, list) or not told:
+        items = top.get("frames")
+        if not isinstance(items, list) or not items:
             raise BadInputError(f"'{path}' lists no frames; export the capture again.")
         problems += [
-            f"Frame '#{i}' is no JSON object in '{path}'." for i, one in enumerate(told) if not isinstance(one, dict)
+            f"Frame '#{i}' is no JSON object in '{path}'."
+            for i, entry in enumerate(items)
+            if not isinstance(entry, dict)
         ]
-        entries = [Entry(top, one, _name(one, i)) for i, one in enumerate(told) if isinstance(one, dict)]
-        entries, said = _without_test(top, entries)
+        entries = [Entry(top, entry, _name(entry, i)) for i, entry in enumerate(items) if isinstance(entry, dict)]
+        entries, remarks = _without_test(top, entries)
         for entry in entries:
             check_model(entry, path)
         listed += entries
-        notes += said + _unexposed(top, entries) + _orientation(top) + lens_notes(entries)
+        notes += remarks + _unexposed(top, entries) + _orientation(top) + lens_notes(entries)
     if (root / TEST_SPLIT).is_file() and not (root / FILE).is_file():
         notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
     names = {entry.name for entry in listed}
@@ -95,8 +97,8 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         return made
 
     frames, more = usable(frame, listed)
-    frames, said = _with_settings(frames, list(used.values()))
-    return frames, problems + more, list(dict.fromkeys(notes + said))
+    frames, remarks = _with_settings(frames, list(used.values()))
+    return frames, problems + more, list(dict.fromkeys(notes + remarks))
 
 
 def _without_test(top: dict[str, Any], entries: list[Entry]) -> tuple[list[Entry], list[str]]:
@@ -107,11 +109,11 @@ def _without_test(top: dict[str, Any], entries: list[Entry]) -> tuple[list[Entry
         return {_plain(v) for v in value if isinstance(v, str)} if isinstance(value, list) else set()
 
     test = split("test_filenames") - split("train_filenames")
-    kept = [entry for entry in entries if _plain(str(entry.own.get("file_path"))) not in test]
-    if not kept or len(kept) == len(entries):
+    others = [entry for entry in entries if _plain(str(entry.own.get("file_path"))) not in test]
+    if not others or len(others) == len(entries):
         return entries, []
-    return kept, [
-        f"{len(entries) - len(kept)} of {len(entries)} frames are listed in 'test_filenames' and were left "
+    return others, [
+        f"{len(entries) - len(others)} of {len(entries)} frames are listed in 'test_filenames' and were left "
         "out; take them out of that list to use them."
     ]
 
@@ -164,11 +166,11 @@ def _ended(path: Path, name: str) -> Path:
     try:
         if path.is_file() or path.suffix.lower() in ENDINGS:
             return path
-        found = [full for full in (path.with_name(path.name + ending) for ending in ENDINGS) if full.is_file()]
+        files = [full for full in (path.with_name(path.name + ending) for ending in ENDINGS) if full.is_file()]
     except (OSError, ValueError) as error:  # a name that the system can't even ask for
         raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
-    if found:
-        return found[0]
+    if files:
+        return files[0]
     return path if path.suffix else path.with_name(path.name + ENDINGS[0])
 
 
@@ -180,28 +182,28 @@ def _brackets(root: Path, entry: Entry, outside: bool) -> tuple[Shot, ...]:
     listed, name = entry.own.get("brackets"), entry.name
     if listed in (None, []):
         return ()
-    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+    if not isinstance(listed, list) or not all(isinstance(bracket, dict) for bracket in listed):
         raise BadInputError(
             f"Frame '{name}' has brackets that are no list of objects; give file_path and exposure of each."
         )
-    if any(one.get(EXPOSURE) is None for one in listed):
+    if any(bracket.get(EXPOSURE) is None for bracket in listed):
         raise BadInputError(f"Frame '{name}' has brackets without an exposure; give each its own.")
     saturation = {"saturation": entry.get("saturation")}
     return tuple(
         Shot(
-            _ended(inside(root, one.own.get("file_path"), name, outside), name),
-            one.positive(EXPOSURE, 1.0),
-            one.positive("saturation", math.inf),
+            _ended(inside(root, bracket.own.get("file_path"), name, outside), name),
+            bracket.positive(EXPOSURE, 1.0),
+            bracket.positive("saturation", math.inf),
         )
-        for one in (Entry(saturation, told, name) for told in listed)
+        for bracket in (Entry(saturation, keys, name) for keys in listed)
     )
 
 
-def _with_settings(frames: Sequence[Frame], told: Sequence[Entry]) -> tuple[list[Frame], list[str]]:
+def _with_settings(frames: Sequence[Frame], entries: Sequence[Entry]) -> tuple[list[Frame], list[str]]:
     """As `exposures.from_settings`, by what each frame's entry tells, unless any of them states an exposure."""
-    if any(keys.get(EXPOSURE) is not None for one in told for keys in (one.top, one.own)):
+    if any(keys.get(EXPOSURE) is not None for entry in entries for keys in (entry.top, entry.own)):
         return list(frames), []
-    return from_settings(frames, [_settings(one) for one in told], "the camera's settings in the poses' file")
+    return from_settings(frames, [_settings(entry) for entry in entries], "the camera's settings in the poses' file")
 
 
 def _settings(entry: Entry) -> Settings | None:
@@ -259,11 +261,11 @@ def _in_frames_world(
         return mesh, []
     moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     if reading.convention != AS_READ and frames:
-        there, here = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
-        if there > MOST and here < FEW:
+        after, before = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
+        if after > MOST and before < FEW:
             return replace(mesh, vertices=moved), [
-                f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {there:.0%} of "
-                f"the cameras are then within its box, and {here:.0%} else; --convention {AS_READ} leaves it."
+                f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {after:.0%} of "
+                f"the cameras are then within its box, and {before:.0%} else; --convention {AS_READ} leaves it."
             ]
     if top.get("applied_transform") is None and top.get("applied_scale") is None:
         return mesh, []

@@ -33,7 +33,7 @@ OWN_LENS = "scan_relight_lens"
 
 @dataclass(frozen=True)
 class Entry:
-    """What the file tells of a frame: its `own` keys, then those at the `top`. `name` is the frame's, for messages."""
+    """A frame's values in the file: its `own` keys, then those at the `top`. `name` is the frame's, for messages."""
 
     top: dict[str, Any]
     own: dict[str, Any]
@@ -49,8 +49,8 @@ class Entry:
         if value is None or value == math.inf and default == math.inf:
             return default
         if not is_number(value) or not value > 0:
-            most = " and below 1e300" if isinstance(value, (int, float)) and value > 0 else ""
-            raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number above 0{most}.")
+            bound = " and below 1e300" if isinstance(value, (int, float)) and value > 0 else ""
+            raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number above 0{bound}.")
         return float(value)
 
     def numbers(self, keys: Sequence[str]) -> list[float]:
@@ -88,8 +88,8 @@ def read_camera(entry: Entry, picture: Path, pose: np.ndarray) -> Camera:
     centre = [entry.get("cx", width / 2), entry.get("cy", height / 2)]
     if not all(is_number(value) for value in centre):
         raise BadInputError(f"Frame '{entry.name}' has a principal point that is no number; mend its cx and cy.")
-    told = entry.own.get(OWN_LENS)
-    lens = _lens(entry) if told is None else _own_lens(told, entry.name)
+    stored_lens = entry.own.get(OWN_LENS)
+    lens = _lens(entry) if stored_lens is None else _own_lens(stored_lens, entry.name)
     if entry.model in (FISHEYE, FISHEYE624):
         radius = entry.positive("fisheye_crop_radius", None)
         if radius is not None and lens is not None:
@@ -97,9 +97,9 @@ def read_camera(entry: Entry, picture: Path, pose: np.ndarray) -> Camera:
     return Camera(width, height, fx, fy, float(centre[0]), float(centre[1]), pose, lens)
 
 
-def _own_lens(told: Any, name: str) -> Lens | None:
+def _own_lens(stored_lens: Any, name: str) -> Lens | None:
     try:
-        return lens_of(told)
+        return lens_of(stored_lens)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise BadInputError(f"Frame '{name}' has a {OWN_LENS} that is none; capture the scene again.") from error
 
@@ -124,17 +124,17 @@ def lens_notes(entries: Sequence[Entry]) -> list[str]:
 
 
 def _focal_lengths(entry: Entry, width: int, height: int) -> tuple[float, float]:
-    found = [entry.positive(key, None) for key in ("fl_x", "fl_y")]
+    focal = [entry.positive(key, None) for key in ("fl_x", "fl_y")]
     if entry.model == PANORAMA:  # nerfstudio's are half the width, for pi; `Equirectangular` counts in radians
-        return (found[0] or width / 2) / math.pi, (found[1] or found[0] or height) / math.pi
+        return (focal[0] or width / 2) / math.pi, (focal[1] or focal[0] or height) / math.pi
     fisheye = entry.model in (FISHEYE, FISHEYE624)
     for axis, (key, extent) in enumerate((("camera_angle_x", width), ("camera_angle_y", height))):
         angle = entry.positive(key, None)
         if angle is not None and not angle < math.pi:
             raise BadInputError(f"Frame '{entry.name}' has a {key} of {angle}; give radians below pi.")
         if angle is not None and not fisheye:
-            found[axis] = found[axis] or extent / 2 / math.tan(angle / 2)
-    fx, fy = found[0] or found[1], found[1] or found[0]
+            focal[axis] = focal[axis] or extent / 2 / math.tan(angle / 2)
+    fx, fy = focal[0] or focal[1], focal[1] or focal[0]
     if fx is None or fy is None:
         wanted = "fl_x" if fisheye else "fl_x or camera_angle_x"
         raise BadInputError(f"Frame '{entry.name}' has no focal length; give {wanted}.")
@@ -168,8 +168,8 @@ def _lens(entry: Entry) -> Lens | None:
 
 
 def _listed(entry: Entry) -> list[float]:
-    told_apart = any(entry.own.get(key) is not None for key in (*RADIAL, *TANGENTIAL))
-    values = entry.own.get(LISTED, None if told_apart else entry.top.get(LISTED))
+    has_coefficients = any(entry.own.get(key) is not None for key in (*RADIAL, *TANGENTIAL))
+    values = entry.own.get(LISTED, None if has_coefficients else entry.top.get(LISTED))
     if values is None:
         return []
     if not isinstance(values, list) or not all(is_number(v) for v in values):

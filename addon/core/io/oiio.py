@@ -125,13 +125,13 @@ def read_coded(path: Path) -> Stored:
 def _library(path: Path) -> Any:
     """The module OpenImageIO; pip's bpy has it in a folder that only Blender as a program puts on the path."""
     if importlib.util.find_spec("OpenImageIO") is None:
-        found = (
+        folders = (
             folder.parent
             for entry in sys.path
             for python in ("python*/", "")
             for folder in Path(entry).glob(f"bpy/*/python/lib/{python}site-packages/OpenImageIO")
         )
-        sys.path += [str(folder) for folder in found][:1]
+        sys.path += [str(folder) for folder in folders][:1]
     try:
         import OpenImageIO
     except ImportError as error:

@@ -25,22 +25,22 @@ def oriented(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
 
     Frames whose camera fits both go with those that fit one; where none does, the poses' up decides if it is clear.
     """
-    held = {i: found for i, frame in enumerate(frames) if (found := _orientation(frame)) != 1}
-    fits = {i: _fits(frames[i], found) for i, found in held.items()}
-    told = [fit for fit in fits.values() if fit is not None]
+    held = {i: orientation for i, frame in enumerate(frames) if (orientation := _orientation(frame)) != 1}
+    fits = {i: _fits(frames[i], orientation) for i, orientation in held.items()}
+    decided = [fit for fit in fits.values() if fit is not None]
     open_ones = [i for i, fit in fits.items() if fit is None]
-    if told:
-        rest: bool | None = 2 * sum(told) > len(told)
+    if decided:
+        default: bool | None = 2 * sum(decided) > len(decided)
     else:
-        rest = _by_gravity([(frames[i], held[i]) for i in open_ones])
-    turned = {i for i, fit in fits.items() if (rest if fit is None else fit)}
+        default = _by_gravity([(frames[i], held[i]) for i in open_ones])
+    turned = {i for i, fit in fits.items() if (default if fit is None else fit)}
     notes = []
     if turned:
         notes.append(
             f"{len(turned)} of {len(frames)} pictures were turned as they tell that the camera was held (EXIF): their "
             "cameras fit them so alone."
         )
-    if open_ones and rest is None:
+    if open_ones and default is None:
         notes.append(
             f"{len(open_ones)} of {len(frames)} pictures are to be turned by their EXIF (the first: "
             f"'{frames[open_ones[0]].name}'), and their cameras fit both ways; they were taken as stored, as COLMAP "
@@ -52,10 +52,10 @@ def oriented(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
 def _orientation(frame: Frame) -> int:
     """EXIF's number; 1 as well where the picture can't be read, which is told later, or the number is none."""
     try:
-        found = picture_orientation(frame.path)
+        orientation = picture_orientation(frame.path)
     except BadInputError:
         return 1
-    return found if 1 <= found <= 8 else 1
+    return orientation if 1 <= orientation <= 8 else 1
 
 
 def _fits(frame: Frame, orientation: int) -> bool | None:

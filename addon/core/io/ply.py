@@ -96,23 +96,23 @@ def _parse(content: bytes) -> PlyMesh:
         data = np.frombuffer(content, np.uint8)
     else:
         data, at = _numbers(content[at:]).view(np.uint8), 0
-    found: dict[str, _Records] = {}
+    records_of: dict[str, _Records] = {}
     for element in elements:
-        found[element.name] = records = _Records(data, order, element, at)
+        records_of[element.name] = records = _Records(data, order, element, at)
         at = records.end
-        if {"vertex", "face"} <= found.keys():
+        if {"vertex", "face"} <= records_of.keys():
             break
-    if "vertex" not in found:
+    if "vertex" not in records_of:
         raise ValueError("holds no vertices")
-    place, *pairs = (found["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
+    place, *pairs = (records_of["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
     if place is None:
         raise ValueError("has vertices without x, y and z")
     vertices = place.astype(np.float64)
-    if "face" not in found:
+    if "face" not in records_of:
         none = np.zeros((0, 3), np.int32)
         return PlyMesh(vertices, none, None, None, np.zeros(0, np.int64), none)
 
-    faces = found["face"]
+    faces = records_of["face"]
     name = next((n for n in INDEX_NAMES if n in faces.counts), None)
     if name is None:
         raise ValueError("has faces without vertex_indices")
@@ -202,20 +202,20 @@ class _Records:
 
     def __init__(self, data: np.ndarray, order: str, element: Element, at: int):
         self._data, self._order, self._element = data, order, element
-        n, own = element.count, [self._kind(p.count_kind or p.kind).itemsize for p in element.properties]
-        if n * max(sum(own), 1) > data.size - at:
+        n, sizes = element.count, [self._kind(p.count_kind or p.kind).itemsize for p in element.properties]
+        if n * max(sum(sizes), 1) > data.size - at:
             what = f"claims {n} of '{element.name}' but ends before them"
             raise ValueError(f"{what}: it is cut off, or its header is wrong")
         lists = [p for p in element.properties if p.count_kind]
         self.counts = dict(zip((p.name for p in lists), self._lengths(lists, at).T))
         entries = {p.name: self.counts[p.name] * self._kind(p.kind).itemsize for p in lists}
-        size = sum(own) + sum(entries.values(), np.zeros(n, np.int64))
+        size = sum(sizes) + sum(entries.values(), np.zeros(n, np.int64))
         place = at + np.cumsum(size) - size
         self.end = at + int(size.sum())
         if self.end > data.size:
             raise ValueError(f"ends within its '{element.name}' records, or they are damaged")
         self.places: dict[str, np.ndarray] = {}
-        for p, bytes_of_it in zip(element.properties, own):
+        for p, bytes_of_it in zip(element.properties, sizes):
             self.places[p.name] = place + bytes_of_it if p.count_kind else place
             place = place + bytes_of_it + entries.get(p.name, 0)
 
@@ -238,8 +238,8 @@ class _Records:
 
     def _take(self, at: np.ndarray, kind: str) -> np.ndarray:
         """The value at each of the positions `at` ((k,) int)."""
-        found = self._kind(kind)
-        return self._data[at[:, None] + np.arange(found.itemsize)].view(found)[:, 0]
+        dtype = self._kind(kind)
+        return self._data[at[:, None] + np.arange(dtype.itemsize)].view(dtype)[:, 0]
 
     def _lengths(self, lists: list[Property], at: int) -> np.ndarray:
         """Entries of each list of each record, (n, lists) int64."""
@@ -262,7 +262,7 @@ class _Records:
 
     def _walked(self, records: int, at: int) -> tuple[np.ndarray, int]:
         """The same of the first records, one after the other, and the bytes that they take."""
-        begin, size, found = at, self._data.size, []
+        begin, size, counts = at, self._data.size, []
         steps = []  # what lies before a list's length, how that is read, and how large an entry is
         gap = 0
         for p in self._element.properties:
@@ -276,17 +276,17 @@ class _Records:
         name = self._element.name
         try:
             for _ in range(records):
-                for before, read_length, own, each in steps:
+                for before, read_length, length_size, each in steps:
                     at += before
                     (count,) = read_length(self._data.data, at)
                     if not 0 <= count <= size or count != int(count):
                         raise ValueError(f"holds a list of {count} entries in '{name}': it is damaged")
-                    found.append(int(count))
-                    at += own + int(count) * each
+                    counts.append(int(count))
+                    at += length_size + int(count) * each
                 at += gap
         except struct.error:
             raise ValueError(f"ends within its '{name}' records: it is cut off") from None
-        return np.array(found, np.int64).reshape(records, len(steps)), at - begin
+        return np.array(counts, np.int64).reshape(records, len(steps)), at - begin
 
 
 def _triangles(
@@ -305,8 +305,10 @@ def _triangles(
     of_entry = np.repeat(np.arange(len(counts)), counts)
     bad = ~((entries >= 0) & (entries < len(vertices)) & (entries == np.floor(entries))) & (counts[of_entry] >= 3)
     if bad.any():
-        one = int(bad.argmax())
-        raise ValueError(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
+        first_bad = int(bad.argmax())
+        raise ValueError(
+            f"has a face ({of_entry[first_bad]}) that points to vertex {entries[first_bad]} of {len(vertices)}"
+        )
     first, pieces = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     face = np.repeat(np.arange(len(counts)), pieces)
     later = (1 + np.arange(len(face)) - np.repeat(np.cumsum(pieces) - pieces, pieces)).astype(np.int32)

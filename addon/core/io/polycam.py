@@ -60,10 +60,10 @@ def read(root: Path, reading: Reading) -> Layout:
     blurred: list[str] = []
 
     def frame(file: Path) -> Frame:
-        told = read_json(file)
-        camera = pinhole(told, CAMERA, file)
-        pose = check_pose([[told.get(f"t_{i}{k}") for k in range(4)] for i in range(3)], file.stem)
-        if is_number(score := told.get("blur_score")) and score < BLURRED:
+        entry = read_json(file)
+        camera = pinhole(entry, CAMERA, file)
+        pose = check_pose([[entry.get(f"t_{i}{k}") for k in range(4)] for i in range(3)], file.stem)
+        if is_number(score := entry.get("blur_score")) and score < BLURRED:
             blurred.append(file.stem)
         picture = next((p for p in (pictures / (file.stem + end) for end in ENDINGS) if p.is_file()), None)
         return Frame(
@@ -81,10 +81,10 @@ def read(root: Path, reading: Reading) -> Layout:
             "poses were taken, which drift."
         )
     if blurred and len(blurred) < len(frames) / 2:
-        gone = set(blurred)
-        frames = [one for one in frames if one.name not in gone]
+        names = set(blurred)
+        frames = [item for item in frames if item.name not in names]
         notes.append(
-            f"{len(gone)} of {len(listed)} frames are blurred by Polycam's measure (blur_score below {BLURRED:g}; the "
+            f"{len(names)} of {len(listed)} frames are blurred by Polycam's measure (blur_score below {BLURRED:g}; the "
             f"first: '{blurred[0]}') and were passed over."
         )
     mesh = read_y_up(path, reading, _alignment(root))
@@ -95,14 +95,14 @@ def _alignment(root: Path) -> np.ndarray | None:
     """From the mesh's coordinates to those of the cameras, (4, 4); None where they are the same."""
     if not (root / MESH_INFO).is_file():
         return None
-    told: Any = read_json(root / MESH_INFO).get("alignmentTransform")
-    if told is None:
+    matrix: Any = read_json(root / MESH_INFO).get("alignmentTransform")
+    if matrix is None:
         return None
-    if isinstance(told, list) and all(isinstance(row, list) for row in told):
-        told = [value for row in told for value in row]
-    if isinstance(told, list) and len(told) == 16 and all(map(is_number, told)):
+    if isinstance(matrix, list) and all(isinstance(row, list) for row in matrix):
+        matrix = [value for row in matrix for value in row]
+    if isinstance(matrix, list) and len(matrix) == 16 and all(map(is_number, matrix)):
         try:  # column by column; from the cameras' world to the mesh's
-            return np.linalg.inv(check_pose(np.reshape(told, (4, 4)).T, MESH_INFO))
+            return np.linalg.inv(check_pose(np.reshape(matrix, (4, 4)).T, MESH_INFO))
         except BadInputError:
             pass
     raise BadInputError(

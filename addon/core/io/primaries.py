@@ -36,11 +36,11 @@ def rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
     return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
 
 
-def xyz_to_rec709(own: np.ndarray) -> np.ndarray:
-    """(3, 3) matrix to linear Rec.709 from RGB that `own` ((3, 3)) takes to CIE XYZ; white becomes white (Bradford)."""
+def xyz_to_rec709(to_xyz: np.ndarray) -> np.ndarray:
+    """(3, 3) matrix to linear Rec.709 from RGB that `to_xyz` ((3, 3)) takes to XYZ; white becomes white (Bradford)."""
     wanted = rgb_to_xyz(REC709)
-    gain = (BRADFORD @ wanted.sum(1)) / (BRADFORD @ own.sum(1))
-    return np.linalg.solve(wanted, np.linalg.solve(BRADFORD, gain[:, None] * BRADFORD) @ own)
+    gain = (BRADFORD @ wanted.sum(1)) / (BRADFORD @ to_xyz.sum(1))
+    return np.linalg.solve(wanted, np.linalg.solve(BRADFORD, gain[:, None] * BRADFORD) @ to_xyz)
 
 
 def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) -> np.ndarray:
@@ -55,9 +55,9 @@ def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) 
         return rgb
     try:
         with np.errstate(all="raise"):
-            own = rgb_to_xyz(chromaticities)
+            to_xyz = rgb_to_xyz(chromaticities)
             is_xyz = np.allclose(chromaticities[:6], CIE_XYZ, atol=1e-3)
-            matrix = np.linalg.solve(rgb_to_xyz(REC709), own) if is_xyz else xyz_to_rec709(own)
+            matrix = np.linalg.solve(rgb_to_xyz(REC709), to_xyz) if is_xyz else xyz_to_rec709(to_xyz)
     except (ArithmeticError, np.linalg.LinAlgError):
         matrix = np.full((3, 3), np.nan)
     if not np.all(np.abs(matrix) < MAX_GAIN):

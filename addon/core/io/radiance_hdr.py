@@ -47,8 +47,8 @@ class _Header:
         self.format, self.chromaticities = RGBE, None
         self.scale = np.ones(3)
         for line in head[:end].split(b"\n")[1:]:
-            key, found, value = line.partition(b"=")
-            if not found or line.startswith((b"#", b" ", b"\t")):
+            key, separator, value = line.partition(b"=")
+            if not separator or line.startswith((b"#", b" ", b"\t")):
                 continue  # a command line or a comment
             if key == b"FORMAT":
                 self.format = value.strip()

@@ -68,15 +68,15 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
     frames = fold(frames, clipped)
     notes = [*grouped, *_chosen(frames), *notes]
-    known = {one.object_id for one in objects}
+    known = {instance.object_id for instance in objects}
     turn = upright(convention.up)
     mirrors = tuple(
-        replace(one, point=turn @ one.point, normal=turn @ one.normal)
-        for one in layout.mirrors
-        if one.object_id in known
+        replace(mirror, point=turn @ mirror.point, normal=turn @ mirror.normal)
+        for mirror in layout.mirrors
+        if mirror.object_id in known
     )
-    told = tuple(one_line(text) for text in (*warnings, *more, *notes))
-    return Capture(root, mesh, objects, tuple(frames), told, reader.name, mirrors)
+    messages = tuple(one_line(text) for text in (*warnings, *more, *notes))
+    return Capture(root, mesh, objects, tuple(frames), messages, reader.name, mirrors)
 
 
 def _exposed(layout: Layout, reading: Reading) -> Layout:
@@ -110,27 +110,29 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     raw, warnings = repair(layout.mesh)
     count = len(raw.triangles)
     names = layout.names if layout.names is not None else raw.names
-    found = raw.object_id
-    told = found is not None or any(frame.id_path is not None for frame in frames)
-    if found is None and told:
-        found, notes = vote(raw.vertices, raw.triangles, frames, _ids)
+    object_id = raw.object_id
+    has_objects = object_id is not None or any(frame.id_path is not None for frame in frames)
+    if object_id is None and has_objects:
+        object_id, notes = vote(raw.vertices, raw.triangles, frames, _ids)
         warnings += notes
-    elif found is None:
+    elif object_id is None:
         parts = parts_of(raw.vertices, raw.triangles)
-        found, names = parts.part, parts.names
+        object_id, names = parts.part, parts.names
         warnings.append(
             "Nothing tells the mesh's objects: its faces have no object_id. By its shape it has "
             f"{len(names)}; none of them is taken for metal or glass unless you say so."
         )
         if frames and parts.planes:
             added = close_holes(raw.vertices, raw.triangles, parts, frames, _pixels)
-            raw, found, names = _with(raw, added), np.concatenate([found, added.part]), added.names
-    ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
-    if not told:
-        objects = tuple(replace(one, guess=True) for one in objects)
+            raw, object_id, names = _with(raw, added), np.concatenate([object_id, added.part]), added.names
+    ids, objects, more = instances.assign(object_id, names, layout.names_file or instances.FILE)
+    if not has_objects:
+        objects = tuple(replace(instance, guess=True) for instance in objects)
     closed = np.arange(count, len(raw.triangles), dtype=np.int32)
     lit = None if frames else raw.lit
-    mesh = Mesh(raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None, whole=not told)
+    mesh = Mesh(
+        raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None, whole=not has_objects
+    )
     return mesh, objects, warnings + more
 
 
@@ -231,8 +233,12 @@ def describe(capture: Capture) -> dict[str, Any]:
         "curve_of_codes": next((frame.transfer for frame in capture.frames if frame.transfer), ""),
         "masks": sum(frame.mask_path is not None for frame in capture.frames),
         "instances": [
-            {"object_id": one.object_id, "class_name": one.class_name, "triangles": counts.get(one.object_id, 0)}
-            for one in capture.instances
+            {
+                "object_id": instance.object_id,
+                "class_name": instance.class_name,
+                "triangles": counts.get(instance.object_id, 0),
+            }
+            for instance in capture.instances
         ],
         "warnings": list(capture.warnings),
     }

@@ -37,15 +37,15 @@ def register_reader(reader: Reader) -> None:
     BadInputError
         Scan Relight brings a format of that name.
     """
-    if reader.name in {one.name for one in READERS}:
+    if reader.name in {known.name for known in READERS}:
         raise BadInputError(f"There is a format '{reader.name}' already; give the reader another name.")
     _registered[reader.name] = reader
 
 
 def readers() -> tuple[Reader, ...]:
     """All that can be read: what was registered, what other packages bring as entry points, then our own."""
-    taken = {*_registered, *(one.name for one in READERS)}
-    return (*_registered.values(), *(one for one in _of_packages() if one.name not in taken), *READERS)
+    taken = {*_registered, *(reader.name for reader in READERS)}
+    return (*_registered.values(), *(reader for reader in _of_packages() if reader.name not in taken), *READERS)
 
 
 @functools.cache
@@ -67,10 +67,10 @@ def _loaded(point: EntryPoint) -> Reader:
         name, wants, find, read = point.load()
         return Reader(point.name, wants, find, read)
     except Exception as error:  # whatever another package does wrong
-        told = f"The format '{point.name}' can't be loaded from the Python package '{package}' ({error!r}); mend it."
+        message = f"The format '{point.name}' can't be loaded from the Python package '{package}' ({error!r}); mend it."
 
     def refuse(root: Path, reading: Reading) -> Layout:
-        raise BadInputError(told)
+        raise BadInputError(message)
 
     return Reader(point.name, f"nothing, as its package '{package}' is broken", lambda root: False, refuse)
 

@@ -41,13 +41,13 @@ def read(root: Path, reading: Reading) -> Layout:
     BadInputError
         The recording is zipped, its metadata can't be read, or there are no pictures or no mesh.
     """
-    found = _parts(root)
-    if found is None:
-        packed = next(iter(sorted(root.glob(f"*{ARCHIVE}"))), root / f"recording{ARCHIVE}")
-        raise BadInputError(f"'{packed}' is a zip; unzip it, and choose the folder that holds its 'metadata'.")
-    path, folder = found
-    told = read_json(path)
-    poses = told.get("poses")
+    parts = _parts(root)
+    if parts is None:
+        archive = next(iter(sorted(root.glob(f"*{ARCHIVE}"))), root / f"recording{ARCHIVE}")
+        raise BadInputError(f"'{archive}' is a zip; unzip it, and choose the folder that holds its 'metadata'.")
+    path, folder = parts
+    metadata = read_json(path)
+    poses = metadata.get("poses")
     if not isinstance(poses, list) or not poses:
         raise BadInputError(f"'{path}' lists no poses: only recordings of the LiDAR camera have them.")
     pictures = {int(p.stem): p for p in sorted(folder.iterdir()) if PICTURE.fullmatch(p.stem)
@@ -62,7 +62,7 @@ def read(root: Path, reading: Reading) -> Layout:
         if index >= len(poses):
             raise BadInputError(f"Frame '{index}' has no pose in '{path}', which has {len(poses)}.")
         pose = read_pose(poses[index] if isinstance(poses[index], list) else [], f"{index}")
-        return Frame(f"{index:06d}", pictures[index], _camera(told, index, pose, path))
+        return Frame(f"{index:06d}", pictures[index], _camera(metadata, index, pose, path))
 
     frames, problems = usable(frame, chosen)
     notes = [UP]
@@ -78,12 +78,16 @@ def _parts(root: Path) -> tuple[Path, Path] | None:
     return None if metadata is None or folder is None else (metadata, folder)
 
 
-def _camera(told: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> Camera:
+def _camera(metadata: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> Camera:
     """The frame's own camera, else that of the whole recording (`K`, column by column)."""
-    size, own, whole = [told.get("w"), told.get("h")], told.get("perFrameIntrinsicCoeffs"), told.get("K")
-    values: Any = own[index] if isinstance(own, list) and index < len(own) else None
-    if values is None and isinstance(whole, list) and len(whole) == 9:
-        values = [whole[k] for k in (0, 4, 6, 7)]
+    size, per_frame, shared = (
+        [metadata.get("w"), metadata.get("h")],
+        metadata.get("perFrameIntrinsicCoeffs"),
+        metadata.get("K"),
+    )
+    values: Any = per_frame[index] if isinstance(per_frame, list) and index < len(per_frame) else None
+    if values is None and isinstance(shared, list) and len(shared) == 9:
+        values = [shared[k] for k in (0, 4, 6, 7)]
     numbers = [*size, *values] if isinstance(values, list) else []
     if len(numbers) != 6 or not all(map(is_number, numbers)) or min(numbers[:4]) <= 0:
         raise BadInputError(f"'{path}' does not tell the camera of frame '{index}' (w, h and K); export it again.")

@@ -64,9 +64,9 @@ def read(root: Path, reading: Reading) -> Layout:
         panes, wrong = read_panes(root / GLASS)
         mirrors, more = mirrors_of(panes, mesh, names or {})
         notes += wrong + more
-    other = next((one for one in (nerfstudio.READER, traj.READER) if one.find(root)), None)
-    if other is not None:
-        layout = other.read(root, replace(reading, mesh=root / MESH))
+    reader = next((reader for reader in (nerfstudio.READER, traj.READER) if reader.find(root)), None)
+    if reader is not None:
+        layout = reader.read(root, replace(reading, mesh=root / MESH))
         mesh = replace(mesh, vertices=layout.mesh.vertices)  # its reader may have moved it to the poses' world
         notes.append("The capture has frames; the light stored on its mesh is not used.")
         return Layout(layout.frames, mesh, names, names_file, layout.problems, layout.notes + notes, mirrors)
@@ -164,20 +164,20 @@ def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
 
     The mesh with the objects lists the same faces, but not always in the same order: the nearest one counts.
     """
-    other = read_ply(path)
-    if other.object_id is None:
+    annotated = read_ply(path)
+    if annotated.object_id is None:
         raise BadInputError(f"Mesh '{path}' has no object_id on its faces; copy it again.")
-    if not len(other.triangles) or not len(ply.triangles):
+    if not len(annotated.triangles) or not len(ply.triangles):
         raise BadInputError(f"Mesh '{path}' or '{MESH}' has no triangles; copy them again.")
-    here, there = (mesh.vertices[mesh.triangles].mean(1) for mesh in (ply, other))
-    if here.shape == there.shape and np.allclose(here, there, atol=1e-4):
-        return other.object_id, 0.0
-    if not (np.isfinite(here).all() and np.isfinite(there).all()):
+    centres, annotated_centres = (mesh.vertices[mesh.triangles].mean(1) for mesh in (ply, annotated))
+    if centres.shape == annotated_centres.shape and np.allclose(centres, annotated_centres, atol=1e-4):
+        return annotated.object_id, 0.0
+    if not (np.isfinite(centres).all() and np.isfinite(annotated_centres).all()):
         raise BadInputError(f"Mesh '{path}' or '{MESH}' has vertices that are not finite; copy them again.")
-    distance, nearest = cKDTree(there).query(here)
+    distance, nearest = cKDTree(annotated_centres).query(centres)
     edge = float(np.median(np.linalg.norm(np.diff(ply.vertices[ply.triangles[:, :2]], axis=1), axis=2)))
     far = distance > FAR * edge
-    return np.where(far, -1, other.object_id[nearest]), float(far.mean())
+    return np.where(far, -1, annotated.object_id[nearest]), float(far.mean())
 
 
 READER = Reader("replica", FORMATS["replica"], holding(PARAMETERS, MESH), read)

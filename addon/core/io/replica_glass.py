@@ -67,32 +67,32 @@ def read_panes(path: Path) -> tuple[list[Pane], list[str]]:
 
 def mirrors_of(panes: list[Pane], mesh: RawMesh, names: dict[int, str]) -> tuple[list[KnownMirror], list[str]]:
     """The panes that are mirrors and an object of the mesh, and a sentence on all of them."""
-    found: dict[int, KnownMirror] = {}
+    mirrors: dict[int, KnownMirror] = {}
     lost = 0
     for pane in panes:
         if pane.reflectivity < MIRROR:
             continue
-        own = _object(pane, mesh)
-        if own is None:
+        hit = _object(pane, mesh)
+        if hit is None:
             lost += 1
             continue
-        object_id, point = own
-        if object_id not in found or found[object_id].reflectivity < pane.reflectivity:
-            found[object_id] = KnownMirror(object_id, point, pane.normal, pane.reflectivity)
+        object_id, point = hit
+        if object_id not in mirrors or mirrors[object_id].reflectivity < pane.reflectivity:
+            mirrors[object_id] = KnownMirror(object_id, point, pane.normal, pane.reflectivity)
     glass = sum(pane.reflectivity < MIRROR for pane in panes)
     notes = []
     if panes:
-        told = ", ".join(f"{names.get(i, 'object')} ({i}) {m.reflectivity:.0%}" for i, m in sorted(found.items()))
+        listing = ", ".join(f"{names.get(i, 'object')} ({i}) {m.reflectivity:.0%}" for i, m in sorted(mirrors.items()))
         notes.append(
             f"'{FILE}' lists {glass} panes of glass, which are taken as opaque, and {len(panes) - glass} "
-            f"mirrors: {told or 'none that is an object'}."
+            f"mirrors: {listing or 'none that is an object'}."
         )
     if lost:
         notes.append(
             f"{lost} mirrors of '{FILE}' are part of a larger object, or none; they are taken as a picture of "
             "what they show."
         )
-    return list(found.values()), notes
+    return list(mirrors.values()), notes
 
 
 def _object(pane: Pane, mesh: RawMesh) -> tuple[int, np.ndarray] | None:

@@ -66,13 +66,13 @@ def read(root: Path, reading: Reading) -> Layout:
 
 def _pictures(root: Path) -> _Pictures:
     """The folder with HDR pictures; else the first that is there."""
-    there = [kind for kind in PICTURES if (root / kind.folder).is_dir()]
-    if not there:
+    present = [kind for kind in PICTURES if (root / kind.folder).is_dir()]
+    if not present:
         raise BadInputError(f"Capture '{root}' has no pictures; put them into '{root / PICTURES[0].folder}'.")
-    for kind in there:
+    for kind in present:
         if any(path.suffix.lower() in colmap.HDR for path in (root / kind.folder).iterdir()):
             return kind
-    return there[0]
+    return present[0]
 
 
 def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
@@ -102,25 +102,25 @@ def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
         if number in names:
             raise BadInputError(f"'{root / OBJECTS}' lists the object {number} twice; copy it again.")
         names[number] = str(group.get("label") or f"object_{number}")
-        own = np.flatnonzero(np.isin(kinds, segments))
-        members.append((int(size[own].sum()), number, own))
+        indices = np.flatnonzero(np.isin(kinds, segments))
+        members.append((int(size[indices].sum()), number, indices))
     of_segment = np.full(len(kinds), -1, np.int64)
-    for _, number, own in sorted(members, key=lambda one: -one[0]):
-        of_segment[own] = number
+    for _, number, indices in sorted(members, key=lambda member: -member[0]):
+        of_segment[indices] = number
     corner = of_segment[place][mesh.triangles]
     return np.where(corner[:, 1] == corner[:, 2], corner[:, 1], corner[:, 0]), names
 
 
 def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
     number = group.get("objectId", group.get("id")) if isinstance(group, dict) else None
-    own = group.get("segments") if isinstance(group, dict) else None
-    good = isinstance(own, list) and all(isinstance(one, int) and abs(one) < 2**62 for one in own)
+    segments = group.get("segments") if isinstance(group, dict) else None
+    good = isinstance(segments, list) and all(isinstance(segment, int) and abs(segment) < 2**62 for segment in segments)
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number <= MAX_ID or not good:
         raise BadInputError(
             f"'{root / OBJECTS}' has an object (number {i}) without a whole 'objectId' and a list of "
             "'segments'; copy it again."
         )
-    return number, list(own or ())
+    return number, list(segments or ())
 
 
 def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
@@ -151,8 +151,8 @@ def _tests(top: dict[str, Any]) -> set[str]:
 
 def _bad(top: dict[str, Any]) -> set[str]:
     listed = top.get("frames")
-    frames = [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []
-    return {Path(str(one.get("file_path"))).stem for one in frames if one.get("is_bad")}
+    frames = [frame for frame in listed if isinstance(frame, dict)] if isinstance(listed, list) else []
+    return {Path(str(frame.get("file_path"))).stem for frame in frames if frame.get("is_bad")}
 
 
 def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:

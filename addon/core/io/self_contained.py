@@ -61,11 +61,11 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
             dropped = inside or OBJ_DROPPED.match(line) is not None
             inside = dropped and line.rstrip(b"\r\n").endswith(b"\\")
             named |= line.startswith(b"o ")
-            if not dropped and (told := OBJ_PART.match(line)):
-                line = told[1] + f"part {len(placed)}\n".encode()
-                placed.append(Placed(len(placed), told[2].decode("utf-8", "replace").strip(), np.eye(4)))
-            if told := OBJ_MATERIAL.match(line):
-                target.write(f"usemtl {MATERIAL}\n".format(materials.setdefault(told[1], len(materials))).encode())
+            if not dropped and (part := OBJ_PART.match(line)):
+                line = part[1] + f"part {len(placed)}\n".encode()
+                placed.append(Placed(len(placed), part[2].decode("utf-8", "replace").strip(), np.eye(4)))
+            if material := OBJ_MATERIAL.match(line):
+                target.write(f"usemtl {MATERIAL}\n".format(materials.setdefault(material[1], len(materials))).encode())
             elif not dropped:
                 target.write(line)
     return copy, named, placed
@@ -115,20 +115,24 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
         for primitive in list_of(mesh, "primitives", path):
             if not is_index(primitive.get("material"), count):
                 primitive.pop("material", None)
-            kept = primitive.get("extensions")
-            kept = {COMPRESSED: kept[COMPRESSED]} if isinstance(kept, dict) and COMPRESSED in kept else {}
-            primitive["extensions"] = kept
+            extensions = primitive.get("extensions")
+            extensions = (
+                {COMPRESSED: extensions[COMPRESSED]}
+                if isinstance(extensions, dict) and COMPRESSED in extensions
+                else {}
+            )
+            primitive["extensions"] = extensions
     meshes = list_of(top, "meshes", path)
     placed = placed_meshes(list_of(top, "nodes", path), len(meshes), path)
-    placed = [one._replace(name=one.name or str(meshes[one.mesh].get("name") or "")) for one in placed]
-    used = sorted({one.mesh for one in placed})
+    placed = [node._replace(name=node.name or str(meshes[node.mesh].get("name") or "")) for node in placed]
+    used = sorted({node.mesh for node in placed})
     top["nodes"] = [{"mesh": number, "name": f"part {number}"} for number in used]
     top["scenes"], top["scene"] = [{"nodes": list(range(len(used)))}], 0
     for name in ("extensionsUsed", "extensionsRequired"):
-        told = top.get(name, [])
-        if not isinstance(told, list):
+        names = top.get(name, [])
+        if not isinstance(names, list):
             raise BadInputError(f"Mesh '{path}' has '{name}' that is no list; export it again.")
-        top[name] = [one for one in told if one in (COMPRESSED, "KHR_mesh_quantization")]
+        top[name] = [item for item in names if item in (COMPRESSED, "KHR_mesh_quantization")]
         if not top[name]:
             del top[name]
     copy = folder / "mesh.gltf"
@@ -162,10 +166,10 @@ def read_gltf(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
 
 def list_of(value: dict[str, Any], name: str, path: Path) -> list[dict[str, Any]]:
     """The list of objects `name`, empty where absent."""
-    found = value.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    items = value.get(name, [])
+    if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
         raise BadInputError(f"Mesh '{path}' has '{name}' that are no list of objects; export it again.")
-    return found
+    return items
 
 
 def _count(value: Any) -> float:
@@ -181,18 +185,18 @@ def beside(path: Path, uri: Any, what: str) -> Path:
             f"Mesh '{path}' names the {what} {str(uri)[:80]!r}, which does not lie beside it; "
             "export it as one GLB file."
         )
-    found = path.parent / name
+    target = path.parent / name
     try:
-        there = found.is_file()
+        exists = target.is_file()
     except OSError:  # a name that no file can have
-        there = False
-    if not there:
-        raise BadInputError(f"Mesh '{path}' names the {what} '{found}', which is not there; copy it as well.")
-    if not found.resolve().is_relative_to(path.parent.resolve()):
+        exists = False
+    if not exists:
+        raise BadInputError(f"Mesh '{path}' names the {what} '{target}', which is not there; copy it as well.")
+    if not target.resolve().is_relative_to(path.parent.resolve()):
         raise BadInputError(
-            f"Mesh '{path}' names the {what} '{found}', a link out of its folder; copy the file there instead."
+            f"Mesh '{path}' names the {what} '{target}', a link out of its folder; copy the file there instead."
         )
-    return found
+    return target
 
 
 def copy_part(path: Path, target: Path, begin: int, length: int) -> None:

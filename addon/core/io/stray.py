@@ -62,7 +62,7 @@ def read(root: Path, reading: Reading) -> Layout:
         pose = read_pose([values.get(key) for key in POSE], name) @ TO_OPENGL
         return Frame(name, picture, Camera(width, height, fx, fy, cx, cy, pose))
 
-    frames, problems = usable(lambda one: frame(*one), pictures.items())
+    frames, problems = usable(lambda item: frame(*item), pictures.items())
     folder = next(iter(pictures.values())).parent.name
     notes = [
         f"{len(frames)} of {len(rows)} frames are used, of each part of the recording the sharpest; see '{folder}'."
@@ -79,10 +79,10 @@ def _rows(root: Path) -> dict[int, dict[str, float]]:
         whole = dict(zip(LENS, (matrix[k] for k in (0, 4, 2, 5)))) if len(matrix) == 9 else {}
     rows = [whole | dict(zip(head, map(_number, line))) for line in lines]
     numbered = ((row.get("frame", float(i)), row) for i, row in enumerate(rows))
-    found = {int(number): row for number, row in numbered if 0 <= number < LONGEST}
-    if not set(POSE) <= set(head) or not found:
+    by_number = {int(number): row for number, row in numbered if 0 <= number < LONGEST}
+    if not set(POSE) <= set(head) or not by_number:
         raise BadInputError(f"'{root / POSES}' lists no poses ({', '.join(POSE)}); export the recording again.")
-    return found
+    return by_number
 
 
 def _cells(path: Path) -> list[list[str]]:

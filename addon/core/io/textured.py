@@ -23,10 +23,10 @@ from .transfer import SRGB
 def find(root: Path) -> bool:
     """Whether the folder's only mesh is of a kind that can have a texture, and it is no result that was exported."""
     try:
-        found = [one for one in root.iterdir() if one.suffix.lower() in (".ply", *IMPORTED) and one.is_file()]
+        meshes = [path for path in root.iterdir() if path.suffix.lower() in (".ply", *IMPORTED) and path.is_file()]
     except OSError:
         return False
-    return len(found) == 1 and found[0].suffix.lower() in IMPORTED and not (root / "materials.json").exists()
+    return len(meshes) == 1 and meshes[0].suffix.lower() in IMPORTED and not (root / "materials.json").exists()
 
 
 def read(root: Path, reading: Reading) -> Layout:
@@ -42,23 +42,25 @@ def read(root: Path, reading: Reading) -> Layout:
         raise BadInputError(f"Mesh '{path}' can't have a texture; give a GLB, glTF or OBJ file, or cameras and frames.")
     mesh = read_mesh(path, reading)
     pictures = base_colours(path)
-    known = list(dict.fromkeys(one for one in pictures if one is not None))
-    if mesh.material is None or mesh.uv is None or not known:
+    textures = list(dict.fromkeys(picture for picture in pictures if picture is not None))
+    if mesh.material is None or mesh.uv is None or not textures:
         raise BadInputError(
             f"Capture '{root}' has no frames, and its mesh '{path.name}' no texture with coordinates; give it either."
         )
-    for one in known:
-        with as_file(one) as file:
+    for picture in textures:
+        with as_file(picture) as file:
             try:
                 picture_size(file)
             except BadInputError as error:
                 what = str(error).replace(str(file), path.name)
                 raise BadInputError(f"The texture of '{path}' can't be read: {what}") from error
-    number = np.array([-1 if one is None else known.index(one) for one in (*pictures, None)], np.int32)
-    shown = number[np.clip(mesh.material, -1, len(pictures) - 1)]
-    if not (shown >= 0).any():
+    numbers = np.array([-1 if picture is None else textures.index(picture) for picture in (*pictures, None)], np.int32)
+    texture_of = numbers[np.clip(mesh.material, -1, len(pictures) - 1)]
+    if not (texture_of >= 0).any():
         raise BadInputError(f"No triangle of '{path}' shows a texture; export it again, or add cameras and frames.")
-    lit = LitTexture(tuple(known), shown, mesh.uv, reading.transfer if reading.transfer not in ("", AUTO) else SRGB)
+    lit = LitTexture(
+        tuple(textures), texture_of, mesh.uv, reading.transfer if reading.transfer not in ("", AUTO) else SRGB
+    )
     note = (
         "The capture has no cameras: the light is taken from the texture of its mesh. That is weaker than frames: "
         "highlights can't be told, nor what the texture clips, nor what lies outside."

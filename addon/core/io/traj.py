@@ -50,7 +50,7 @@ def read(root: Path, reading: Reading) -> Layout:
         pose = check_pose(_matrix(lines[index], name), name)
         return Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL))
 
-    frames, problems = usable(lambda one: frame(*one), sorted(pictures.items()))
+    frames, problems = usable(lambda item: frame(*item), sorted(pictures.items()))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
     return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
@@ -88,15 +88,15 @@ def _matrix(line: str, name: str) -> np.ndarray:
 
 def _pictures(folder: Path) -> dict[int, Path]:
     """The picture of each line; of several kinds the one that holds most: they are listed in that order."""
-    found: dict[int, Path] = {}
+    pictures: dict[int, Path] = {}
     order = {ending: place for place, ending in enumerate(ENDINGS)}
     for path in folder.iterdir() if folder.is_dir() else ():
         match = PICTURE.match(path.stem)
         if match and path.suffix.lower() in order and path.is_file() and len(match[1]) < 10:
-            other = found.get(int(match[1]))
-            if other is None or order[path.suffix.lower()] < order[other.suffix.lower()]:
-                found[int(match[1])] = path
-    return found
+            present = pictures.get(int(match[1]))
+            if present is None or order[path.suffix.lower()] < order[present.suffix.lower()]:
+                pictures[int(match[1])] = path
+    return pictures
 
 
 def _mesh(root: Path, reading: Reading) -> RawMesh:

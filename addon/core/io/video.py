@@ -101,21 +101,21 @@ def _sharpest(video: Path, windows: Sequence[np.ndarray]) -> Iterator[tuple[int,
         with _opened(video) as (container, stream):
             size = stream.codec_context.width, stream.codec_context.height
             check_claim(video, *size, REFERENCES * size[0] * size[1])
-            shown = sorted({packet.pts for packet in container.demux(stream) if packet.size and packet.pts is not None})
+            times = sorted({packet.pts for packet in container.demux(stream) if packet.size and packet.pts is not None})
         wanted = int(windows[-1][-1]) + 1
-        if not shown or abs(len(shown) - wanted) > max(1, SLACK * wanted):
-            raise BadInputError(f"Video '{video}' has {len(shown)} frames, and {wanted} have poses; copy it again.")
-        if len(shown) * size[0] * size[1] > max(DENSE[0], DENSE[1] * video.stat().st_size):
+        if not times or abs(len(times) - wanted) > max(1, SLACK * wanted):
+            raise BadInputError(f"Video '{video}' has {len(times)} frames, and {wanted} have poses; copy it again.")
+        if len(times) * size[0] * size[1] > max(DENSE[0], DENSE[1] * video.stat().st_size):
             raise BadInputError(f"Video '{video}' claims more frames than it can hold; copy it again.")
-        number_of = {time: number for number, time in enumerate(shown)}
-        window_of = {int(number): k for k, window in enumerate(windows) for number in window if number < len(shown)}
+        number_of = {time: number for number, time in enumerate(times)}
+        window_of = {int(number): k for k, window in enumerate(windows) for number in window if number < len(times)}
         lost = set(window_of.values())
         parts = len(lost)
         with _opened(video) as (container, stream):
-            told = ((number_of.get(frame.pts, -1), frame) for frame in _decoded(container, stream))
-            asked = ((n, frame) for n, frame in told if n in window_of and (frame.width, frame.height) == size)
-            for window, group in groupby(asked, lambda one: window_of[one[0]]):
-                number, frame = max(group, key=lambda one: _sharpness(one[1]))
+            numbered = ((number_of.get(frame.pts, -1), frame) for frame in _decoded(container, stream))
+            candidates = ((n, frame) for n, frame in numbered if n in window_of and (frame.width, frame.height) == size)
+            for window, group in groupby(candidates, lambda pair: window_of[pair[0]]):
+                number, frame = max(group, key=lambda pair: _sharpness(pair[1]))
                 lost.discard(window)
                 yield number, _picture(frame, video)
         if lost:
@@ -160,7 +160,7 @@ def _sharpness(frame: Any) -> float:
     """Sum of squares of the steps between neighbours in luma at half the size: motion blur takes it away."""
     small = frame.reformat(frame.width // 2 or 1, frame.height // 2 or 1, "gray", threads=1)
     steps = (np.diff(small.to_ndarray().astype(np.float32), axis=axis) for axis in (0, 1))
-    return float(sum(np.vdot(one, one) for one in steps))
+    return float(sum(np.vdot(step, step) for step in steps))
 
 
 def _picture(frame: Any, video: Path) -> np.ndarray:
@@ -190,9 +190,9 @@ def _rgb(frame: Any, bits: int) -> np.ndarray:
         for plane in frame.planes
     )
     down, across = -(-y.shape[0] // cb.shape[0]), -(-y.shape[1] // cb.shape[1])
-    cb, cr = ((one - 128 * shift).repeat(down, 0).repeat(across, 1)[: y.shape[0], : y.shape[1]] for one in (cb, cr))
+    cb, cr = ((plane - 128 * shift).repeat(down, 0).repeat(across, 1)[: y.shape[0], : y.shape[1]] for plane in (cb, cr))
     if frame.color_range == FULL:
-        y, cb, cr = (one / np.float32((1 << bits) - 1) for one in (y, cb, cr))
+        y, cb, cr = (plane / np.float32((1 << bits) - 1) for plane in (y, cb, cr))
     else:
         y, cb, cr = (y - 16 * shift) / (219 * shift), cb / (224 * shift), cr / (224 * shift)
     of_red, of_blue = LUMA[frame.colorspace]

@@ -1,8 +1,8 @@
-"""Arrays and what is told of them in one file, as NumPy reads it; that it was changed, or is cut off, is found out.
+"""Arrays and their metadata in one file, as NumPy reads it; that it was changed, or is cut off, is found out.
 
-A .npz whose last entry holds what is told, as JSON, and the checksum (CRC-32) of every array, in their order: the one
-that the zip format has anyway, so that it costs nothing. It tells accidents, and changes by programs that don't know of
-it; it is no signature.
+A .npz whose last entry holds the metadata, as JSON, and the checksum (CRC-32) of every array, in their order: the one
+that the zip format has anyway, so that it costs nothing. It detects accidents, and changes by programs that don't know
+of it; it is no signature.
 """
 
 import json
@@ -26,8 +26,8 @@ class Damaged(Exception):
     """A file is no archive as it was written: cut off, changed, or of something else."""
 
 
-def write_archive(path: Path, arrays: Mapping[str, np.ndarray], told: Mapping[str, Any]) -> None:
-    """Write `arrays` and what is `told` of them, whole or not at all; the same content makes the same file.
+def write_archive(path: Path, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, Any]) -> None:
+    """Write `arrays` and their `metadata`, whole or not at all; the same content makes the same file.
 
     Uncompressed: compressing costs more time than it saves, as these are mostly noise in their low bits.
 
@@ -46,8 +46,8 @@ def write_archive(path: Path, arrays: Mapping[str, np.ndarray], told: Mapping[st
         with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
             for name, array in arrays.items():
                 _write(archive, name, np.asarray(array))
-            sums = [[_name(one), one.CRC] for one in archive.infolist()]
-            content = json.dumps({"told": plain(told), "sums": sums})
+            sums = [[_name(entry), entry.CRC] for entry in archive.infolist()]
+            content = json.dumps({"told": plain(metadata), "sums": sums})
             checked = json.dumps([content, zlib.crc32(content.encode())]).encode()
             _write(archive, META, np.frombuffer(checked, np.uint8))
         file.flush()
@@ -55,7 +55,7 @@ def write_archive(path: Path, arrays: Mapping[str, np.ndarray], told: Mapping[st
 
 
 def read_archive(path: Path, wanted: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """What is told in an archive, and its arrays, all or the `wanted` ones; no other is read.
+    """The metadata of an archive, and its arrays, all or the `wanted` ones; no other is read.
 
     Raises
     ------
@@ -69,14 +69,14 @@ def read_archive(path: Path, wanted: Container[str] | None = None) -> tuple[dict
             size = os.fstat(file.fileno()).st_size
             if _name(last) != META:
                 raise Damaged("what is told of the arrays is missing")
-            content, checked = json.loads(_read(archive, last, size).tobytes())
-            if zlib.crc32(content.encode()) != checked:
+            text, checked = json.loads(_read(archive, last, size).tobytes())
+            if zlib.crc32(text.encode()) != checked:
                 raise Damaged("what is told of the arrays was changed")
-            known = json.loads(content)
-            if known["sums"] != [[_name(one), one.CRC] for one in entries]:
+            content = json.loads(text)
+            if content["sums"] != [[_name(entry), entry.CRC] for entry in entries]:
                 raise Damaged("an array was changed")
-            names = {_name(one): one for one in entries if wanted is None or _name(one) in wanted}
-            return known["told"], {name: _read(archive, one, size) for name, one in names.items()}
+            names = {_name(entry): entry for entry in entries if wanted is None or _name(entry) in wanted}
+            return content["told"], {name: _read(archive, entry, size) for name, entry in names.items()}
     except (FileNotFoundError, MemoryError, Damaged):
         raise
     except Exception as error:  # all that zipfile, NumPy and json raise at what they can't read

@@ -68,11 +68,11 @@ def held(path: Path, should_stop: Callable[[], bool] = lambda: False, params: Lo
     while (file := _make(path, mine)) is None:
         if should_stop():
             raise InterruptedRun("Stopped on request while another worker does this part.")
-        now = _read(path)
-        if now != seen:
-            seen, since = now, time.monotonic()
-        if now and _owner_is_gone(now) or time.monotonic() - since > params.patience:
-            _take_away(path, now)
+        content = _read(path)
+        if content != seen:
+            seen, since = content, time.monotonic()
+        if content and _owner_is_gone(content) or time.monotonic() - since > params.patience:
+            _take_away(path, content)
         else:
             time.sleep(params.look)
     let_go = threading.Event()
@@ -92,14 +92,14 @@ def held(path: Path, should_stop: Callable[[], bool] = lambda: False, params: Lo
 def owner(path: Path) -> str:
     """Who holds the lock at `path`, as "host, process 123"; '' where nobody does, or it is known to be gone."""
     content = _read(path)
-    told = _told(content)
+    entry = _parse(content)
     if not content or _owner_is_gone(content):
         return ""
-    return f"{str(told.get('machine', '?')).split()[0]}, process {told.get('process', '?')}"
+    return f"{str(entry.get('machine', '?')).split()[0]}, process {entry.get('process', '?')}"
 
 
 def machine() -> str:
-    """This machine and, where they can be told, its start and its space of process ids: process ids are told within."""
+    """This machine and, where known, its boot and its namespace of process ids: within these such an id is unique."""
     parts = [socket.gethostname() or "unnamed"]
     with contextlib.suppress(OSError):
         parts += [Path("/proc/sys/kernel/random/boot_id").read_text().strip(), os.readlink("/proc/self/ns/pid")]
@@ -150,20 +150,20 @@ def _read(path: Path) -> bytes:
         return b""
 
 
-def _told(content: bytes) -> dict[str, object]:
+def _parse(content: bytes) -> dict[str, object]:
     try:
-        told = json.loads(content.partition(b"\n")[0])
+        entry = json.loads(content.partition(b"\n")[0])
     except ValueError:
         return {}
-    return told if isinstance(told, dict) else {}
+    return entry if isinstance(entry, dict) else {}
 
 
 def _owner_is_gone(content: bytes) -> bool:
     """Whether the owner was a process of this very machine that is there no more."""
-    told = _told(content)
-    process = told.get("process")
+    entry = _parse(content)
+    process = entry.get("process")
     # Windows' os.kill ends the process that is asked about.
-    if sys.platform == "win32" or told.get("machine") != machine() or " " not in machine():
+    if sys.platform == "win32" or entry.get("machine") != machine() or " " not in machine():
         return False
     if not isinstance(process, int) or process <= 0:
         return False

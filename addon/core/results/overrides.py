@@ -1,4 +1,4 @@
-"""What the artist gives instead of what the frames say: model, roughness, F0, colour of objects, and a known white.
+"""What the artist gives instead of what the frames tell: model, roughness, F0, colour of objects, and a known white.
 
 As JSON, with every key optional; what is not given is fitted under what is given:
 
@@ -75,10 +75,10 @@ class Given:
 
     def as_dict(self) -> dict[str, Any]:
         """What is given, as the file has it."""
-        told = {one.name: getattr(self, one.name) for one in fields(self)}
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
         return {
             name: list(value) if isinstance(value, tuple) else value
-            for name, value in told.items()
+            for name, value in values.items()
             if value is not None
         }
 
@@ -127,31 +127,31 @@ class Overrides:
 
     def lobes(self) -> dict[int, Given]:
         """What bears on the fit of highlights, of the objects that have any."""
-        return {i: one.lobe for i, one in sorted(self.objects.items()) if one.lobe.any}
+        return {i: given.lobe for i, given in sorted(self.objects.items()) if given.lobe.any}
 
     def lobes_key(self) -> tuple[str, ...]:
         """A digest of that as a tuple of one; empty where nothing is given."""
-        told = {str(i): one.as_dict() for i, one in self.lobes().items()}
-        return (key("overrides", told),) if told else ()
+        lobes = {str(i): given.as_dict() for i, given in self.lobes().items()}
+        return (key("overrides", lobes),) if lobes else ()
 
     def chain(self, object_id: int) -> tuple[int, ...]:
         """The objects that this one is the same as, one after the other; the last is described by itself."""
-        found: list[int] = []
-        other = self.of(object_id).same_as
-        while other is not None:
-            found.append(other)
-            other = self.of(other).same_as
-        return tuple(found)
+        ids: list[int] = []
+        target = self.of(object_id).same_as
+        while target is not None:
+            ids.append(target)
+            target = self.of(target).same_as
+        return tuple(ids)
 
     def as_dict(self) -> dict[str, Any]:
         """As the file has it."""
-        objects = {str(i): one.as_dict() for i, one in sorted(self.objects.items())}
-        told: dict[str, Any] = {"objects": objects}
+        objects = {str(i): given.as_dict() for i, given in sorted(self.objects.items())}
+        entry: dict[str, Any] = {"objects": objects}
         if self.white is not None:
-            told["white"] = {"object": self.white.object_id, "albedo": list(self.white.albedo)}
+            entry["white"] = {"object": self.white.object_id, "albedo": list(self.white.albedo)}
             if self.white.at is not None:
-                told["white"]["at"] = list(self.white.at)
-        return told
+                entry["white"]["at"] = list(self.white.at)
+        return entry
 
 
 NOTHING = Given()
@@ -169,21 +169,21 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
     BadInputError
         Objects are to be the same as each other in a circle.
     """
-    objects = {i: one for i, one in older.objects.items() if (i, "") not in newer.back}
+    objects = {i: given for i, given in older.objects.items() if (i, "") not in newer.back}
     for object_id, name in newer.back:
         if name and object_id in objects:
             objects[object_id] = replace(objects[object_id], **{name: None})
-    for object_id, one in newer.objects.items():
-        given = one.as_dict()
-        outdated: tuple[str, ...] = LOBE if "same_as" in given else ("same_as",) if given.keys() & set(LOBE) else ()
-        if "model" in given:
-            outdated += _has_no(given["model"])
-        elif given.keys() & set(_has_no(objects.get(object_id, NOTHING).model)):
+    for object_id, given in newer.objects.items():
+        values = given.as_dict()
+        outdated: tuple[str, ...] = LOBE if "same_as" in values else ("same_as",) if values.keys() & set(LOBE) else ()
+        if "model" in values:
+            outdated += _has_no(values["model"])
+        elif values.keys() & set(_has_no(objects.get(object_id, NOTHING).model)):
             outdated += ("model",)  # a highlight is given now, so it is diffuse no longer
-        was = replace(objects.get(object_id, NOTHING), **dict.fromkeys(outdated))
-        objects[object_id] = replace(was, **{name: getattr(one, name) for name in given})
+        older_given = replace(objects.get(object_id, NOTHING), **dict.fromkeys(outdated))
+        objects[object_id] = replace(older_given, **{name: getattr(given, name) for name in values})
     white = newer.white or (None if ("white", "") in newer.back else older.white)
-    merged = Overrides({i: one for i, one in sorted(objects.items()) if one.any}, white)
+    merged = Overrides({i: given for i, given in sorted(objects.items()) if given.any}, white)
     if circle := _circle(merged):
         raise BadInputError(
             f"What is kept and what is given together make objects the same as each other in a circle "
@@ -210,10 +210,10 @@ def read_overrides(path: Path, known: Iterable[int]) -> Overrides:
         raise BadInputError(f"'{path}' is no file; give the JSON file with what is to be overridden.")
     try:
         with readable(f"'{path}'", "give one that can"):
-            told = json.loads(path.read_text(encoding="utf-8-sig"))
+            content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise BadInputError(f"'{path}' is not valid JSON ({error}); mend it there.") from error
-    return parse(told, f"'{path}'", known)
+    return parse(content, f"'{path}'", known)
 
 
 def kept_overrides(folder: Path, known: Iterable[int]) -> Overrides:
@@ -244,13 +244,13 @@ def heeded(folder: Path, known: Iterable[int], file: Path | None = None, keep: b
     return merge(older, read_overrides(file, known)) if file is not None else older
 
 
-def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
+def parse(content: Any, name: str, known: Iterable[int]) -> Overrides:
     """Overrides from what JSON holds; `name` is what errors call it. Parameters and errors as of `read_overrides`."""
     known = set(known)
-    _keys(told, ("objects", "white"), name)
+    _keys(content, ("objects", "white"), name)
     objects: dict[int, Given] = {}
     back: set[tuple[int | str, str]] = set()
-    entries = told.get("objects") or {}
+    entries = content.get("objects") or {}
     if not isinstance(entries, dict):
         raise BadInputError(
             f'{name}: \'objects\' has to be an object of JSON by object_id, such as {{"12": {{"model": "metal"}}}}.'
@@ -260,20 +260,20 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
         if entry is None:
             back.add((object_id, ""))
             continue
-        one, gone = _given(object_id, entry, known, name)
-        back |= {(object_id, key) for key in gone}
-        if one.any:
-            objects[object_id] = one
+        given, removed = _given(object_id, entry, known, name)
+        back |= {(object_id, key) for key in removed}
+        if given.any:
+            objects[object_id] = given
     white = None
-    if "white" in told:
-        white = _white(told["white"], known, name)
+    if "white" in content:
+        white = _white(content["white"], known, name)
         back |= {("white", "")} if white is None else set()
-    found = Overrides(objects, white, frozenset(back))
-    if circle := _circle(found):
+    overrides = Overrides(objects, white, frozenset(back))
+    if circle := _circle(overrides):
         raise BadInputError(
             f"{name}: objects are the same as each other in a circle ({circle}); give one of them values of its own."
         )
-    return found
+    return overrides
 
 
 def _has_no(model: str | None) -> tuple[str, ...]:
@@ -284,27 +284,29 @@ def _has_no(model: str | None) -> tuple[str, ...]:
 
 def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Given, list[str]]:
     where = f"{name}, object {object_id}"
-    _keys(entry, tuple(one.name for one in fields(Given)), where)
-    gone = [key for key, value in entry.items() if value is None]
-    said = {key: value for key, value in entry.items() if value is not None}
-    found: dict[str, Any] = {}
-    if (model := said.get("model")) is not None:
-        allowed = [one.name for one in models() if one.can_be_given]
+    _keys(entry, tuple(f.name for f in fields(Given)), where)
+    removed = [key for key, value in entry.items() if value is None]
+    values = {key: value for key, value in entry.items() if value is not None}
+    parsed: dict[str, Any] = {}
+    if (model := values.get("model")) is not None:
+        allowed = [brdf.name for brdf in models() if brdf.can_be_given]
         if model not in allowed:
             raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(allowed)}.")
-        found["model"] = model
+        parsed["model"] = model
     parsers: tuple[Callable[..., Any], ...]
     parsers = _share, partial(_colour, keep_number=True), partial(_colour, number=False)
-    found |= {name: parse(said[name], f"{where}: '{name}'") for name, parse in zip(VALUES, parsers) if name in said}
-    if "same_as" in said:
-        found["same_as"] = _object(said["same_as"], known, f"{where}, 'same_as'")
-    also = [key for key in LOBE if key in said]
-    if "same_as" in said and also:
+    parsed |= {
+        name: parse(values[name], f"{where}: '{name}'") for name, parse in zip(VALUES, parsers) if name in values
+    }
+    if "same_as" in values:
+        parsed["same_as"] = _object(values["same_as"], known, f"{where}, 'same_as'")
+    also = [key for key in LOBE if key in values]
+    if "same_as" in values and also:
         raise BadInputError(f"{where}: 'same_as' brings the other object's {also[0]}; leave one of the two out.")
-    for name_of in _has_no(model):
-        if name_of in said:
-            raise BadInputError(f"{where}: model '{model}' has no '{name_of}'; leave one of the two out.")
-    return Given(**found), gone
+    for parameter in _has_no(model):
+        if parameter in values:
+            raise BadInputError(f"{where}: model '{model}' has no '{parameter}'; leave one of the two out.")
+    return Given(**parsed), removed
 
 
 def _white(entry: Any, known: set[int], name: str) -> White | None:
@@ -312,9 +314,9 @@ def _white(entry: Any, known: set[int], name: str) -> White | None:
         return None
     where = f"{name}, 'white'"
     _keys(entry, ("object", "albedo", "at"), where)
-    for part in ("object", "albedo"):
-        if entry.get(part) is None:
-            raise BadInputError(f"{where}: '{part}' is missing; give " + '{"object": 26, "albedo": 0.8}.')
+    for required in ("object", "albedo"):
+        if entry.get(required) is None:
+            raise BadInputError(f"{where}: '{required}' is missing; give " + '{"object": 26, "albedo": 0.8}.')
     albedo = _colour(entry["albedo"], f"{where}: 'albedo'")
     if min(albedo) <= 0:
         raise BadInputError(f"{where}: 'albedo' is {entry['albedo']}; a known white is more than 0 in every channel.")
@@ -347,10 +349,10 @@ def _object(number: Any, known: set[int], where: str) -> int:
 
 
 def _listed(known: set[int]) -> str:
-    some = sorted(known)
-    if some and some == list(range(some[0], some[-1] + 1)):
-        return f"{some[0]} to {some[-1]}"
-    return ", ".join(map(str, some[:20])) + (", ..." if len(some) > 20 else "") if some else "none"
+    ids = sorted(known)
+    if ids and ids == list(range(ids[0], ids[-1] + 1)):
+        return f"{ids[0]} to {ids[-1]}"
+    return ", ".join(map(str, ids[:20])) + (", ..." if len(ids) > 20 else "") if ids else "none"
 
 
 def _share(value: Any, where: str) -> float:
@@ -369,16 +371,16 @@ def _colour(value: Any, where: str, number: bool = True, keep_number: bool = Fal
             f"{where} is {value!r}; give {'a number or ' if number else ''}three numbers from 0 to 1 "
             "(red, green, blue)."
         )
-    return tuple(_share(one, where) for one in value)
+    return tuple(_share(channel, where) for channel in value)
 
 
 def _circle(overrides: Overrides) -> str:
     """The first circle of `same_as`, as text; '' if there is none."""
     for start in overrides.objects:
-        chain, here = [start], overrides.of(start).same_as
-        while here is not None and here not in chain:
-            chain.append(here)
-            here = overrides.of(here).same_as
-        if here is not None:
-            return " -> ".join(map(str, (*chain[chain.index(here) :], here)))
+        chain, current = [start], overrides.of(start).same_as
+        while current is not None and current not in chain:
+            chain.append(current)
+            current = overrides.of(current).same_as
+        if current is not None:
+            return " -> ".join(map(str, (*chain[chain.index(current) :], current)))
     return ""

@@ -27,22 +27,22 @@ def write_capture(folder: Path | str, capture: Path | str) -> None:
         relative = Path(os.path.relpath(capture, folder)).as_posix()
     except ValueError:  # another drive
         relative = ""
-    told = {"folder": str(capture), "relative": relative}
-    write_bytes(folder / CAPTURE, json.dumps(told, indent=1, ensure_ascii=False).encode() + b"\n")
+    entry = {"folder": str(capture), "relative": relative}
+    write_bytes(folder / CAPTURE, json.dumps(entry, indent=1, ensure_ascii=False).encode() + b"\n")
 
 
 def captures(folder: Path | str) -> tuple[Path, ...]:
-    """Where the capture of a result folder may lie: as it was told, and beside the result as it was then.
+    """Where the capture of a result folder may lie: at its absolute path, and beside the result as it was then.
 
     The second holds where a project's folder was moved as a whole. Empty where the folder is no result.
     """
     folder = Path(folder)
     try:
-        told = json.loads((folder / CAPTURE).read_text(encoding="utf-8"))
-        found = [Path(told["folder"])]
-        if told.get("relative"):
-            found.append(Path(os.path.normpath(folder.absolute() / told["relative"])))
-        return tuple(found)
+        entry = json.loads((folder / CAPTURE).read_text(encoding="utf-8"))
+        paths = [Path(entry["folder"])]
+        if entry.get("relative"):
+            paths.append(Path(os.path.normpath(folder.absolute() / entry["relative"])))
+        return tuple(paths)
     except DAMAGE:
         pass
     root = root_of(folder)  # of an earlier version
@@ -82,9 +82,9 @@ def _numbered(parent: Path, name: str):
 def documents() -> Path:
     """The user's folder of documents as the system tells it, or the home folder."""
     home = Path.home()
-    for one in (_known_folder(), _xdg(home), home / "Documents"):
-        if one is not None and one.is_dir():
-            return one
+    for folder in (_known_folder(), _xdg(home), home / "Documents"):
+        if folder is not None and folder.is_dir():
+            return folder
     return home
 
 
@@ -92,10 +92,10 @@ def _xdg(home: Path) -> Path | None:
     """What the desktop's settings say (Linux): `XDG_DOCUMENTS_DIR` in user-dirs.dirs."""
     settings = Path(os.environ.get("XDG_CONFIG_HOME") or home / ".config") / "user-dirs.dirs"
     try:
-        found = re.search(r'^\s*XDG_DOCUMENTS_DIR="(.+)"\s*$', settings.read_text(encoding="utf-8"), re.MULTILINE)
+        match = re.search(r'^\s*XDG_DOCUMENTS_DIR="(.+)"\s*$', settings.read_text(encoding="utf-8"), re.MULTILINE)
     except (OSError, ValueError):
         return None
-    return Path(found[1].replace("$HOME", str(home))) if found else None
+    return Path(match[1].replace("$HOME", str(home))) if match else None
 
 
 def _known_folder() -> Path | None:
@@ -104,9 +104,9 @@ def _known_folder() -> Path | None:
         return None
     import winreg
 
-    place = r"Software\Microsoft\Windows\CurrentVersion\Explorer\User Shell Folders"
+    subkey = r"Software\Microsoft\Windows\CurrentVersion\Explorer\User Shell Folders"
     try:
-        with winreg.OpenKey(winreg.HKEY_CURRENT_USER, place) as key:
+        with winreg.OpenKey(winreg.HKEY_CURRENT_USER, subkey) as key:
             return Path(os.path.expandvars(winreg.QueryValueEx(key, "Personal")[0]))
     except OSError:
         return None

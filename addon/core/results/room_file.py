@@ -56,23 +56,23 @@ def run_of(folder: Path | str) -> str:
 
     Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
     """
-    return _told(folder, "run")
+    return _text(folder, "run")
 
 
 def layout_of(folder: Path | str) -> str:
     """The key of how a result folder's images are laid out; '' as for `run_of`."""
-    return _told(folder, "layout")
+    return _text(folder, "layout")
 
 
-def _told(folder: Path | str, name: str) -> str:
-    key = json_if_sound(Path(folder) / MATERIALS).get(name)
-    return key if isinstance(key, str) else ""
+def _text(folder: Path | str, name: str) -> str:
+    value = json_if_sound(Path(folder) / MATERIALS).get(name)
+    return value if isinstance(value, str) else ""
 
 
 def objects_of(folder: Path | str) -> set[int]:
     """The objects of a folder's result, lamps that the run found by itself among them; none where there is none."""
     try:
-        return {int(one["object_id"]) for one in json_if_sound(Path(folder) / MATERIALS).get("objects", ())}
+        return {int(entry["object_id"]) for entry in json_if_sound(Path(folder) / MATERIALS).get("objects", ())}
     except DAMAGE:
         return set()
 
@@ -80,8 +80,11 @@ def objects_of(folder: Path | str) -> set[int]:
 def openings_of(folder: Path | str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Corners ((q, 4, 3)) and radiance ((3,)) of each panel in `OPENINGS`; none where the file is absent or damaged."""
     try:
-        told = json.loads((Path(folder) / OPENINGS).read_text(encoding="utf-8"))["openings"]
-        return [(np.array(one["corners"], float).reshape(-1, 4, 3), np.array(one["radiance"], float)) for one in told]
+        panels = json.loads((Path(folder) / OPENINGS).read_text(encoding="utf-8"))["openings"]
+        return [
+            (np.array(panel["corners"], float).reshape(-1, 4, 3), np.array(panel["radiance"], float))
+            for panel in panels
+        ]
     except DAMAGE:
         return []
 
@@ -91,10 +94,10 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
     mesh = capture.mesh
     if atlas_uv is None:
         atlas_uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
-    told = {
+    metadata = {
         "root": str(capture.root.absolute()),
         "format": capture.format,
-        "instances": [[one.object_id, one.class_name, one.guess] for one in capture.instances],
+        "instances": [[instance.object_id, instance.class_name, instance.guess] for instance in capture.instances],
         "frames": [
             [
                 frame.name,
@@ -104,7 +107,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
             ]
             for frame in capture.frames
         ],
-        "pictures": [_told_picture(frame) for frame in capture.frames],
+        "pictures": [_picture_to_json(frame) for frame in capture.frames],
     }
     arrays = {
         "vertices": mesh.vertices,
@@ -115,7 +118,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
     }
     if mesh.uv is not None:
         arrays["uv"] = mesh.uv
-    write_archive(folder / ROOM, arrays, told)
+    write_archive(folder / ROOM, arrays, metadata)
 
 
 def read_room(folder: Path | str) -> Room:
@@ -136,8 +139,10 @@ def read_room(folder: Path | str) -> Room:
             )
     capture, atlas_uv = read_capture_file(folder)
     try:
-        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
-        return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
+        content = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
+        return Room(
+            capture, atlas_uv, tuple(material(entry) for entry in content["objects"]), folder, content.get("run", "")
+        )
     except BadInputError as error:  # such as a reflectance model that is not there
         raise BadInputError(f"The result in '{folder}' can't be shown: {error}") from error
     except DAMAGE as error:
@@ -148,66 +153,68 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
     """The capture in `ROOM`, and its `atlas_uv`; raises `BadInputError` where the file is absent or damaged."""
     folder = Path(folder)
     try:
-        told, arrays = read_archive(folder / ROOM)
+        metadata, arrays = read_archive(folder / ROOM)
         frames = tuple(
             Frame(name, Path(path), Camera(width, height, fx, fy, cx, cy, pose, lens_of(lens)))
             for (name, path, (width, height, fx, fy, cx, cy), lens), pose in zip(
-                told["frames"], arrays["poses"], strict=True
+                metadata["frames"], arrays["poses"], strict=True
             )
         )
-        pictures = told.get("pictures") or [{}] * len(frames)
-        frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
-        instances = tuple(Instance(int(number), name, *guess) for number, name, *guess in told["instances"])
-        whole = all(one.guess for one in instances)
+        pictures = metadata.get("pictures") or [{}] * len(frames)
+        frames = tuple(
+            replace(frame, **_picture_from_json(picture)) for frame, picture in zip(frames, pictures, strict=True)
+        )
+        instances = tuple(Instance(int(number), name, *guess) for number, name, *guess in metadata["instances"])
+        whole = all(instance.guess for instance in instances)
         mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"), whole=whole)
-        return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
+        return Capture(Path(metadata["root"]), mesh, instances, frames, format=metadata["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
         raise _damaged(folder, error) from error
 
 
-def _told_picture(frame: Frame) -> dict[str, Any]:
+def _picture_to_json(frame: Frame) -> dict[str, Any]:
     """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
 
-    def told(path: Path | None) -> str | None:
+    def absolute(path: Path | None) -> str | None:
         return None if path is None else str(path.absolute())
 
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
     return {
-        "mask_path": told(frame.mask_path),
-        "id_path": told(frame.id_path),
+        "mask_path": absolute(frame.mask_path),
+        "id_path": absolute(frame.id_path),
         "exposure": frame.exposure,
         "saturation": finite(frame.saturation),
         "transfer": frame.transfer,
         "turned": frame.turned,
         "margin": frame.margin,
-        "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
+        "brackets": [[absolute(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
     }
 
 
-def _picture(told: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a `Frame` that `_told_picture` tells; none where it is of an older result."""
-    if not told:
+def _picture_from_json(stored: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a `Frame` that `_picture_to_json` stores; none where it is of an older result."""
+    if not stored:
         return {}
 
-    def level(value: float | None) -> float:
+    def number(value: float | None) -> float:
         return math.inf if value is None else value
 
-    paths = {name: told[name] and Path(told[name]) for name in ("mask_path", "id_path")}
-    brackets = tuple(Shot(Path(path), exposure, level(value)) for path, exposure, value in told["brackets"])
+    paths = {name: stored[name] and Path(stored[name]) for name in ("mask_path", "id_path")}
+    brackets = tuple(Shot(Path(path), exposure, number(value)) for path, exposure, value in stored["brackets"])
     return paths | {
-        "exposure": told["exposure"],
-        "saturation": level(told["saturation"]),
-        "transfer": told["transfer"],
-        "turned": told.get("turned", False),
-        "margin": told.get("margin", 0),
+        "exposure": stored["exposure"],
+        "saturation": number(stored["saturation"]),
+        "transfer": stored["transfer"],
+        "turned": stored.get("turned", False),
+        "margin": stored.get("margin", 0),
         "brackets": brackets,
     }
 
 
 def root_of(folder: Path | str) -> Path | None:
-    """Folder of the capture that `ROOM` tells of, and nothing else of it; None where the file is absent or damaged."""
+    """Folder of the capture in `ROOM`, and nothing else of it; None where the file is absent or damaged."""
     try:
         return Path(read_archive(Path(folder) / ROOM, ())[0]["root"])
     except DAMAGE:

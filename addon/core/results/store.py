@@ -120,8 +120,8 @@ class Store:
         """The arrays of stage `name`; None where it is absent, was made under another key, or is damaged."""
         if self.stored_key(name) != key:
             return None
-        found = self._read(name, None)
-        return None if found is None else found[1]
+        stored = self._read(name, None)
+        return None if stored is None else stored[1]
 
     def load_meta(self, name: str, key: str) -> dict[str, Any] | None:
         """What `save` was given as `meta`; None as for `load`."""
@@ -129,13 +129,13 @@ class Store:
 
     def stored_meta(self, name: str) -> dict[str, Any]:
         """What the stage `name` was stored with as `meta`, under whatever key; empty where it is absent or damaged."""
-        found = self._read(name, ())
-        return found[0]["meta"] if found else {}
+        stored = self._read(name, ())
+        return stored[0]["meta"] if stored else {}
 
     def stored_key(self, name: str) -> str | None:
         """The key under which the stage `name` is stored; None where it is absent or damaged."""
-        found = self._read(name, ())
-        return found[0]["key"] if found else None
+        stored = self._read(name, ())
+        return stored[0]["key"] if stored else None
 
     def _read(self, name: str, wanted: Container[str] | None) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
         """A stage's archive; None where it is absent, or damaged, which is noted."""

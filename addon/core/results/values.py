@@ -34,22 +34,22 @@ def packed(value: Any, arrays: Arrays) -> Any:
     if isinstance(value, Brdf):
         return {"brdf": value.name}
     if isinstance(value, dict):
-        return {"dict": [[packed(one, arrays) for one in pair] for pair in value.items()]}
+        return {"dict": [[packed(item, arrays) for item in pair] for pair in value.items()]}
     for kind in (tuple, list, frozenset):
         if type(value) is kind:
-            return {kind.__name__: [packed(one, arrays) for one in (sorted(value) if kind is frozenset else value)]}
+            return {kind.__name__: [packed(item, arrays) for item in (sorted(value) if kind is frozenset else value)]}
     if is_dataclass(value) and not isinstance(value, type):
-        told = {one.name: packed(getattr(value, one.name), arrays) for one in fields(value)}
-        return {"value": type(value).__name__, "fields": told}
+        content = {field.name: packed(getattr(value, field.name), arrays) for field in fields(value)}
+        return {"value": type(value).__name__, "fields": content}
     raise TypeError(f"{type(value).__name__} is no value that can be stored")
 
 
-def unpacked(told: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, type]) -> Any:
+def unpacked(stored: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, type]) -> Any:
     """The inverse of `packed`.
 
     Parameters
     ----------
-    told
+    stored
         As JSON has it.
     kinds : mapping of str to type
         The frozen values that may be in it, by name.
@@ -59,11 +59,11 @@ def unpacked(told: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, ty
     LookupError
         Something in it is none of these, or an array or a reflectance model is not there.
     """
-    if not isinstance(told, dict):
-        return told
-    if "value" in told:
-        return kinds[told["value"]](**{k: unpacked(one, arrays, kinds) for k, one in told["fields"].items()})
-    [(kind, content)] = told.items()
+    if not isinstance(stored, dict):
+        return stored
+    if "value" in stored:
+        return kinds[stored["value"]](**{k: unpacked(item, arrays, kinds) for k, item in stored["fields"].items()})
+    [(kind, content)] = stored.items()
     if kind == "array":
         return arrays[content]
     if kind == "scalar":
@@ -71,9 +71,11 @@ def unpacked(told: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, ty
     if kind == "float":
         return float.fromhex(content)
     if kind == "brdf":
-        if (found := find(content)) is None:
+        if (brdf := find(content)) is None:
             raise LookupError(f"there is no reflectance model '{content}'")
-        return found
+        return brdf
     if kind == "dict":
-        return {unpacked(k, arrays, kinds): unpacked(one, arrays, kinds) for k, one in content}
-    return {"tuple": tuple, "list": list, "frozenset": frozenset}[kind](unpacked(one, arrays, kinds) for one in content)
+        return {unpacked(k, arrays, kinds): unpacked(item, arrays, kinds) for k, item in content}
+    return {"tuple": tuple, "list": list, "frozenset": frozenset}[kind](
+        unpacked(item, arrays, kinds) for item in content
+    )
