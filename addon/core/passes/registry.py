@@ -48,12 +48,12 @@ class Pass:
     origin: str = ""
 
 
-def _of(stage: str, **does: str) -> tuple[Pass, ...]:
+def _passes_of(stage: str, **does: str) -> tuple[Pass, ...]:
     return tuple(Pass(name.replace("_", "-"), sentence, stage) for name, sentence in does.items())
 
 
 PASSES = (
-    *_of(
+    *_passes_of(
         "surface",
         frame_choice="Passes over frames that show nothing which others don't show from as near.",
         close_holes="Closes holes of a mesh without objects in its large planes, where frames see nothing there.",
@@ -62,7 +62,7 @@ PASSES = (
         coarse_unseen="Lets one element stand for many texels where no frame looks.",
         two_sides="Gives triangles that frames see from both sides a second side of its own.",
     ),
-    *_of(
+    *_passes_of(
         "lit_diffuse",
         radiometric_calibration="Tells what codes mean, and exposures, by places that several frames show.",
         white_balance="Tells the white balance that all frames have, by how a camera follows what it sees.",
@@ -70,7 +70,7 @@ PASSES = (
         sharpening="Takes the projection's blur out of the lit diffuse texture.",
         edge_tier="Uses observations at depth edges only where there are too few others.",
     ),
-    *_of(
+    *_passes_of(
         "shading",
         clipped_lamps="Solves for lamps that the sensor clipped, from the light that they send.",
         clipped_patches="Takes what nearly all frames clip, or is far brighter than a room without objects, as lamps.",
@@ -89,7 +89,7 @@ PASSES = (
         tilt_error="Counts irradiance on triangles that noise has turned as less certain.",
         unseen_surfaces="Lets what no frame sees reflect like the rest of its object.",
     ),
-    *_of(
+    *_passes_of(
         "specular",
         grazing="Lets the diffuse part darken towards grazing views.",
         pixel_curvature="Widens lobes by how the surface turns within a pixel, and fits them where it turns little.",
@@ -104,7 +104,7 @@ PASSES = (
         glossy_light="Lights the room by what glossy things really reflect.",
         caustics="Follows light from bright triangles over glossy things by photons.",
     ),
-    *_of(
+    *_passes_of(
         "write",
         bias_field="Takes the smooth error that irradiance leaves in an object's albedo out of it.",
         albedo_prior="Shrinks uncertain albedo towards its neighbourhood's.",
@@ -117,11 +117,11 @@ PASSES = (
     ),
 )  # fmt: skip
 """All of them in the order of the stages."""
-_own = {one.name: one for one in PASSES}
-_others: dict[str, Pass] = {}
+_built_in = {pass_.name: pass_ for pass_ in PASSES}
+_registered: dict[str, Pass] = {}
 
 
-def register(one: Pass) -> Pass:
+def register(pass_: Pass) -> Pass:
     """Have a pass of another package called at the end of its stage, after those that were registered before.
 
     Raises
@@ -129,28 +129,30 @@ def register(one: Pass) -> Pass:
     BadInputError
         There is a pass of that name already, or it has no stage or function that it could have.
     """
-    if one.name in _own or _others.get(one.name, one) is not one:
-        raise BadInputError(f"There is a pass '{one.name}' already; give the new one another name.")
-    if one.stage not in OPEN_STAGES or one.run is None:
-        raise BadInputError(f"The pass '{one.name}' needs a function, and one of the stages {', '.join(OPEN_STAGES)}.")
-    _others[one.name] = one
-    return one
+    if pass_.name in _built_in or _registered.get(pass_.name, pass_) is not pass_:
+        raise BadInputError(f"There is a pass '{pass_.name}' already; give the new one another name.")
+    if pass_.stage not in OPEN_STAGES or pass_.run is None:
+        raise BadInputError(
+            f"The pass '{pass_.name}' needs a function, and one of the stages {', '.join(OPEN_STAGES)}."
+        )
+    _registered[pass_.name] = pass_
+    return pass_
 
 
 def passes() -> tuple[Pass, ...]:
     """All of them, the program's own first."""
-    _installed()
-    return (*PASSES, *_others.values())
+    _register_installed()
+    return (*PASSES, *_registered.values())
 
 
 def stage_of(name: str) -> str:
     """The first stage that a pass changes. Raises `KeyError` where there is no such pass."""
-    return _own[name].stage if name in _own else {one.name: one.stage for one in passes()}[name]
+    return _built_in[name].stage if name in _built_in else {pass_.name: pass_.stage for pass_ in passes()}[name]
 
 
 def check(without: Collection[str]) -> None:
     """Raise `BadInputError` for a name that is no pass's."""
-    known = [one.name for one in passes()]
+    known = [pass_.name for pass_ in passes()]
     for name in without:
         if name not in known:
             raise BadInputError(f"There is no pass '{name}' to leave out; choose among {', '.join(known)}.")
@@ -159,12 +161,12 @@ def check(without: Collection[str]) -> None:
 def left_out_of(stage: str, without: Collection[str]) -> tuple[str, ...]:
     """Those of the program's own passes left out that change `stage` first: a part of its key."""
     assert stage in RUN_STAGES
-    return tuple(name for name in sorted(without) if name in _own and _own[name].stage == stage)
+    return tuple(name for name in sorted(without) if name in _built_in and _built_in[name].stage == stage)
 
 
 def following(stage: str, without: Collection[str]) -> tuple[Pass, ...]:
     """Other packages' passes that follow a stage, in the order in which they are called."""
-    return tuple(one for one in passes()[len(PASSES) :] if one.stage == stage and one.name not in without)
+    return tuple(pass_ for pass_ in passes()[len(PASSES) :] if pass_.stage == stage and pass_.name not in without)
 
 
 def followed(stage: str, value: T, before: Mapping[str, Any], without: Collection[str]) -> T:
@@ -175,27 +177,27 @@ def followed(stage: str, value: T, before: Mapping[str, Any], without: Collectio
     ScanRelightError
         One of them failed, or gave something else.
     """
-    for one in following(stage, without):
-        assert one.run is not None
-        told = f"The pass '{one.name}' of '{one.origin or of_thing(one.run)}'"
+    for pass_ in following(stage, without):
+        assert pass_.run is not None
+        subject = f"The pass '{pass_.name}' of '{pass_.origin or of_thing(pass_.run)}'"
         try:
-            found = one.run(value, before)
+            result = pass_.run(value, before)
         except ScanRelightError:
             raise
         except Exception as error:  # whatever another package does wrong
-            raise ScanRelightError(f"{told} failed ({error!r}); mend it, or leave it out.") from error
-        if type(found) is not type(value):
+            raise ScanRelightError(f"{subject} failed ({error!r}); mend it, or leave it out.") from error
+        if type(result) is not type(value):
             raise ScanRelightError(
-                f"{told} gave a {type(found).__name__}, no {type(value).__name__}; mend it, or leave it out."
+                f"{subject} gave a {type(result).__name__}, no {type(value).__name__}; mend it, or leave it out."
             )
-        value = found
+        value = result
     return value
 
 
 @cache
-def _installed() -> None:
+def _register_installed() -> None:
     """Register, once, what installed packages bring; one that is broken is left out with a warning."""
-    for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+    for entry in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         try:
             register(replace(entry.load(), origin=of_point(entry)))
         except Exception as error:  # whatever another package does wrong

@@ -31,10 +31,10 @@ def documented() -> str:
 @pytest.fixture
 def alone(monkeypatch):
     """Nothing that a test registers stays."""
-    monkeypatch.setattr(registry, "_others", {})
-    registry._installed.cache_clear()
+    monkeypatch.setattr(registry, "_registered", {})
+    registry._register_installed.cache_clear()
     yield
-    registry._installed.cache_clear()
+    registry._register_installed.cache_clear()
 
 
 @pytest.fixture
@@ -48,8 +48,8 @@ def package(alone, tmp_path, monkeypatch):
         told.mkdir(exist_ok=True)
         (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: my_package\nVersion: {version}\n")
         (told / "entry_points.txt").write_text(f"[scan_relight.passes]\nleast-light = {point}\n")
-        registry._others.clear()
-        registry._installed.cache_clear()
+        registry._registered.clear()
+        registry._register_installed.cache_clear()
         importlib.invalidate_caches()
 
     yield install
@@ -104,7 +104,7 @@ def test_what_fails_is_named(alone):
     with pytest.raises(ScanRelightError, match=r"The pass 'bad' of .* failed \(ZeroDivisionError"):
         followed("shading", 1.0, {}, ())
     assert followed("shading", 1.0, {}, ("bad",)) == followed("specular", 1.0, {}, ()) == 1.0
-    registry._others.clear()
+    registry._registered.clear()
     register(Pass("odd", "Gives text.", "shading", lambda value, before: "text"))
     with pytest.raises(ScanRelightError, match="gave a str, no float"):
         followed("shading", 1.0, {}, ())

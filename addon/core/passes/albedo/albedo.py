@@ -61,18 +61,18 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     (n, 3) float32, (n,) bool
     """
     known = np.isfinite(lit_diffuse).all(1)
-    lit = irradiance.mean(1)
-    floor = ALBEDO.floor * float(np.median(lit[known])) if known.any() else 0.0
-    valid = known & (lit > max(floor, 1e-20))
+    mean = irradiance.mean(1)
+    floor = ALBEDO.floor * float(np.median(mean[known])) if known.any() else 0.0
+    valid = known & (mean > max(floor, 1e-20))
     rho = np.full(lit_diffuse.shape, np.nan, np.float32)
     # A single channel may be dark under coloured light: it gets the floor, not a division by nothing.
-    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], ALBEDO.floor * lit[valid, None])
+    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], ALBEDO.floor * mean[valid, None])
     return rho, valid
 
 
-def without_emitters(atlas: Atlas, told: np.ndarray, emitters: set[int]) -> np.ndarray:
-    """Those of the elements `told`, (n,) bool, that are no emitter's."""
-    return told & ~np.isin(atlas.object_id, list(emitters))
+def without_emitters(atlas: Atlas, mask: np.ndarray, emitters: set[int]) -> np.ndarray:
+    """The elements of `mask`, (n,) bool, that are no emitter's."""
+    return mask & ~np.isin(atlas.object_id, list(emitters))
 
 
 def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
@@ -84,7 +84,7 @@ def albedo_of(
     atlas: Atlas,
     lit_diffuse: LitDiffuse,
     irradiance: np.ndarray,
-    unsure: np.ndarray,
+    irradiance_error: np.ndarray,
     instances: tuple[Instance, ...],
     emitters: set[int],
     specular: np.ndarray | float = 0.0,
@@ -96,8 +96,8 @@ def albedo_of(
     ----------
     irradiance : (n, 3) float32
         E, radiance * steradian.
-    unsure : (n,) float32
-        Its relative error.
+    irradiance_error : (n,) float32
+        Relative error of E.
     emitters : set of int
         Objects that have no albedo.
     specular : (n, 3) float32
@@ -106,17 +106,17 @@ def albedo_of(
         Passes left out.
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
-    error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
+    error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), irradiance_error)
     valid &= lit_diffuse.seen
     if "bias-field" not in without:
         rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))
-    guesses = {one.object_id for one in instances if one.guess}
-    found = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses)
+    guesses = {instance.object_id for instance in instances if instance.guess}
+    albedo = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses)
     if "class-albedo" in without:
-        return found
-    told = class_names(one for one in instances if not one.guess)
-    level = shrunk_to_class(atlas, found.rho, found.origin == MEASURED, told)
-    return replace(found, rho=np.minimum(level, MAX_ALBEDO))
+        return albedo
+    class_of = class_names(instance for instance in instances if not instance.guess)
+    shrunk = shrunk_to_class(atlas, albedo.rho, albedo.origin == MEASURED, class_of)
+    return replace(albedo, rho=np.minimum(shrunk, MAX_ALBEDO))
 
 
 def fill(
@@ -139,56 +139,56 @@ def fill(
         Relative standard error of each quotient (`neighbourhood.relative_error`); without it all count as equally good.
         Where it is inf, the quotient counts as not measured.
     guesses : collection of int
-        Objects that shape alone tells.
+        Objects that were told apart by shape alone.
     """
     if error is not None:
         valid = valid & np.isfinite(error)
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = without_emitters(atlas, valid, emitters)
-    everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
+    room_median = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
     error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
-    left = error.copy()
-    by_class: dict[str, list[np.ndarray]] = {}
-    bare: dict[str, list[np.ndarray]] = {}
+    result_error = error.copy()
+    class_medians: dict[str, list[np.ndarray]] = {}
+    unmeasured: dict[str, list[np.ndarray]] = {}
     measured = []
-    for own in by_label(_parts(atlas, valid)):
-        object_id = int(atlas.object_id[own[0]])
+    for elements in by_label(_parts(atlas, valid)):
+        object_id = int(atlas.object_id[elements[0]])
         if object_id in emitters:
-            result[own], origin[own], left[own] = 0, NONE, 0
-        elif not valid[own].any():
-            bare.setdefault(class_of.get(object_id, ""), []).append(own)
+            result[elements], origin[elements], result_error[elements] = 0, NONE, 0
+        elif not valid[elements].any():
+            unmeasured.setdefault(class_of.get(object_id, ""), []).append(elements)
         else:
-            measured.append(own)
-    guessed = [own for own in measured if int(atlas.object_id[own[0]]) in guesses]
-    beside = _references(atlas, guessed, result, error) if guessed else None
+            measured.append(elements)
+    guessed = [elements for elements in measured if int(atlas.object_id[elements[0]]) in guesses]
+    guessed_references = _references(atlas, guessed, result, error) if guessed else None
 
-    def shrunk_part(own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        by = beside if int(atlas.object_id[own[0]]) in guesses else None
-        return shrink(atlas, own, result[own], error[own], without, by)
+    def shrunk_part(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        references = guessed_references if int(atlas.object_id[elements[0]]) in guesses else None
+        return shrink(atlas, elements, result[elements], error[elements], without, references)
 
-    each = ordered_map(shrunk_part, measured, 0)
-    for own, shrunk in zip(measured, each, strict=True):
-        result[own], left[own] = shrunk
-        name = class_of.get(int(atlas.object_id[own[0]]), "")
-        by_class.setdefault(name, []).append(np.median(result[own][valid[own]], 0))
-    known = [middle for alike in by_class.values() for middle in alike]
-    for name, groups in bare.items():
-        own, alike = np.concatenate(groups), by_class.get(name)
-        result[own] = np.median(alike, 0) if alike else everywhere
-        origin[own] = NONE
-        left[own] = _spread(alike if alike and len(alike) > 2 else known)
-    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
+    shrunk_parts = ordered_map(shrunk_part, measured, 0)
+    for elements, shrunk in zip(measured, shrunk_parts, strict=True):
+        result[elements], result_error[elements] = shrunk
+        name = class_of.get(int(atlas.object_id[elements[0]]), "")
+        class_medians.setdefault(name, []).append(np.median(result[elements][valid[elements]], 0))
+    all_medians = [median for medians in class_medians.values() for median in medians]
+    for name, groups in unmeasured.items():
+        elements, medians = np.concatenate(groups), class_medians.get(name)
+        result[elements] = np.median(medians, 0) if medians else room_median
+        origin[elements] = NONE
+        result_error[elements] = _spread(medians if medians and len(medians) > 2 else all_medians)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, result_error)
 
 
 def _references(atlas: Atlas, parts: list[np.ndarray], rho: np.ndarray, error: np.ndarray) -> References:
     """The well-measured elements of some parts, (m,) int each."""
-    sure = np.concatenate([own[well_measured(error[own])] for own in parts])
-    return References(atlas.position[sure], rho[sure], error[sure])
+    elements = np.concatenate([part[well_measured(error[part])] for part in parts])
+    return References(atlas.position[elements], rho[elements], error[elements])
 
 
 def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
-    """Numbers of what is filled in together: objects, a sheet's second side by itself if it was measured, (n,) int."""
+    """Labels of what is filled in together: objects, a sheet's second side by itself if it was measured, (n,) int."""
     if atlas.back is None:
         return atlas.object_id
     part = atlas.side
@@ -197,7 +197,7 @@ def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
 
 
 def _spread(albedos: list[np.ndarray]) -> float:
-    """Relative standard deviation of some objects' albedo, (3,) each; that of any two things where there are few."""
+    """Relative standard deviation of some objects' albedo, (3,) each; `ALBEDO.unknown` where there are few."""
     if len(albedos) < 3:
         return ALBEDO.unknown
     level = np.log(np.maximum(np.array(albedos).mean(1), ALBEDO.floor))

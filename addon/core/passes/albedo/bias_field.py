@@ -33,45 +33,45 @@ def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray) -> np.ndar
     result = rho.copy()
     known = np.flatnonzero(measured)
     reach = BIAS.reach * np.sqrt(float(atlas.area[known].sum()))
-    parts = [known[own] for own in by_label(atlas.side[known]) if len(own) >= LEVELS.many]
+    parts = [known[elements] for elements in by_label(atlas.side[known]) if len(elements) >= LEVELS.many]
 
-    def corrected(own: np.ndarray) -> np.ndarray:
-        return rho[own] / np.exp(_field(atlas, own, rho[own], reach))
+    def corrected(elements: np.ndarray) -> np.ndarray:
+        return rho[elements] / np.exp(_field(atlas, elements, rho[elements], reach))
 
-    for own, cleared in zip(parts, ordered_map(corrected, parts, 0), strict=True):
-        result[own] = cleared
+    for elements, cleared in zip(parts, ordered_map(corrected, parts, 0), strict=True):
+        result[elements] = cleared
     return result
 
 
-def _field(atlas: Atlas, own: np.ndarray, rho: np.ndarray, reach: float) -> np.ndarray:
+def _field(atlas: Atlas, elements: np.ndarray, rho: np.ndarray, reach: float) -> np.ndarray:
     """Log of the bias field of one object's m measured elements, (m, 3), around its median."""
-    some = np.random.default_rng(0).permutation(len(own))[: LEVELS.sample]
+    sample = np.random.default_rng(0).permutation(len(elements))[: LEVELS.sample]
     colour = np.log(np.maximum(rho, ALBEDO.floor))
-    area = atlas.area[own][some].astype(float)
-    grid = _Grid(atlas.position[own], atlas.normal[own], some, reach, float(np.sqrt(np.median(area))))
-    offset = colour[some] - _mode(colour[some], area)
+    area = atlas.area[elements][sample].astype(float)
+    grid = _Grid(atlas.position[elements], atlas.normal[elements], sample, reach, float(np.sqrt(np.median(area))))
+    offset = colour[sample] - _mode(colour[sample], area)
     field = np.zeros_like(offset)
     for _ in range(BIAS.rounds):
-        weight = area * _alike(offset - field)
+        weight = area * _membership(offset - field)
         smooth = grid.smooth(offset, weight)
-        field = grid.at(smooth, some)
-    found = grid.at(smooth) - np.median(field, 0)
+        field = grid.at(smooth, sample)
+    bias = grid.at(smooth) - np.median(field, 0)
     # Taken for an error, a patch of another colour keeps its edge, and slopes come about around it.
-    return found if grid.variation(colour - found) < grid.variation(colour) else np.zeros_like(found)
+    return bias if grid.variation(colour - bias) < grid.variation(colour) else np.zeros_like(bias)
 
 
-def _alike(offset: np.ndarray) -> np.ndarray:
-    """How far log colours that are this far from the main one, (m, 3), are of it, (m,): 0...1."""
+def _membership(offset: np.ndarray) -> np.ndarray:
+    """Membership in the main colour, 0...1, (m,), of log colours by their offset from it, (m, 3)."""
     grey = offset.mean(1)
     hue = np.square(offset - grey[:, None]).mean(1)
     return np.exp(-(np.square(grey) + np.square(BIAS.hue) * hue) / (2 * BIAS.tolerance**2))
 
 
 def _mode(colour: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """What log colours, (m, 3), gather around, (3,): mean shift from their median."""
+    """Mode of log colours, (m, 3), by mean shift from their median, (3,)."""
     mode = np.median(colour, 0)
     for _ in range(BIAS.rounds):
-        near = weight * _alike((colour - mode) / 2)
+        near = weight * _membership((colour - mode) / 2)
         mode = near @ colour / max(near.sum(), 1e-30)
     return mode
 

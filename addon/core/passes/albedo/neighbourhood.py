@@ -39,45 +39,47 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
     of_object : bool
         If not, all that was seen once or twice is equally unsure.
     """
-    middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
-    spread = lit.interquartile_range.mean(1) / 1.35 / middle
+    level = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
+    spread = lit.interquartile_range.mean(1) / 1.35 / level
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
-    few: float | np.ndarray = PRIOR.single
+    single: float | np.ndarray = PRIOR.single
     if of_object:
-        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
-    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), PRIOR.least_error)
+        single = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
+    error = np.hypot(
+        1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, single)) / np.sqrt(n), PRIOR.least_error
+    )
     error = np.where(lit.tier == CLEAN, error, error + PRIOR.single)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
 def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.ndarray:
     """Relative error of a single observation of each element's object, (n,), from the elements seen `often`."""
-    few = np.full(int(object_id.max()) + 1, PRIOR.single)
-    ids, known = object_id[often], spread[often]
-    for own in by_label(ids):
-        if len(own) >= LEVELS.enough:
-            usual = PRIOR.single_factor * np.quantile(known[own], ndtr(1.0))
-            few[ids[own[0]]] = min(usual, PRIOR.single)
-    return few[object_id]
+    single = np.full(int(object_id.max()) + 1, PRIOR.single)
+    ids, spreads = object_id[often], spread[often]
+    for index in by_label(ids):
+        if len(index) >= LEVELS.enough:
+            typical = PRIOR.single_factor * np.quantile(spreads[index], ndtr(1.0))
+            single[ids[index[0]]] = min(typical, PRIOR.single)
+    return single[object_id]
 
 
 def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Neighbourhood:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's neighbourhood.
     k = min(PRIOR.neighbours, max(len(references) // 8, 3), len(references))
-    near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
-    middle = np.empty((len(position), 3), np.float32)
+    neighbours = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
+    median = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
     channels = np.ascontiguousarray(log_rho.T)
 
     def gather(part: slice) -> None:
-        around = channels[:, near[part]]
-        middle[part] = _median(around).T
-        width[part] = SIGMA_OF_MAD * _median(np.abs(around - middle[part].T[..., None]).mean(0))
+        values = channels[:, neighbours[part]]
+        median[part] = _median(values).T
+        width[part] = SIGMA_OF_MAD * _median(np.abs(values - median[part].T[..., None]).mean(0))
 
     for_blocks(gather, len(position), BLOCK, 0)
-    return Neighbourhood(middle, np.maximum(width, np.float32(0.02)), near)
+    return Neighbourhood(median, np.maximum(width, np.float32(0.02)), neighbours)
 
 
 def _median(values: np.ndarray) -> np.ndarray:
@@ -93,24 +95,24 @@ def _prior(
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    found = _around(position, references, log_rho)
+    prior = _around(position, references, log_rho)
     if "wide-prior" in without:
-        return found
-    first, allowed = found.middle.copy(), PRIOR.alike * found.width
+        return prior
+    centre, allowed = prior.median.copy(), PRIOR.alike * prior.width
     todo, count = np.arange(len(position)), len(references) // 2
     while count >= 8 * PRIOR.neighbours and len(todo):
         wider = _around(position[todo], references[:count], log_rho[:count])
-        alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
+        alike = np.abs(wider.median - centre[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
-        for kept, new in zip(found, wider, strict=True):
-            kept[todo] = new[alike]
+        for array, new in zip(prior, wider, strict=True):
+            array[todo] = new[alike]
         count //= 2
-    return found
+    return prior
 
 
 @dataclass(frozen=True)
 class References:
-    """Well-measured elements of the parts of a scan that shape alone tells.
+    """Well-measured elements of the parts of a scan that were told apart by shape alone.
 
     Where such parts end is a guess: the rim of one may bear the colour of the next.
 
@@ -146,17 +148,17 @@ def well_measured(error: np.ndarray) -> np.ndarray:
 
 def shrink(
     atlas: Atlas,
-    own: np.ndarray,
+    elements: np.ndarray,
     rho: np.ndarray,
     error: np.ndarray,
     without: Collection[str] = (),
-    beside: References | None = None,
+    references: References | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each shrunk towards its neighbourhood as far as it is uncertain.
 
     Parameters
     ----------
-    own : (m,) int
+    elements : (m,) int
         The object's elements.
     rho : (m, 3) float32
         Clamped quotient; anything where `error` is inf.
@@ -164,8 +166,8 @@ def shrink(
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
     without : collection of str
         Passes left out.
-    beside : References, optional
-        Among which a second colour is looked for, in place of the object's own.
+    references : References, optional
+        Elements among which a second colour is looked for, in place of the object's own.
 
     Returns
     -------
@@ -173,42 +175,44 @@ def shrink(
     error : (m,) float32
         Its relative standard error: the posterior's; the prior's width where nothing was measured.
     """
-    position = atlas.position[own]
+    position = atlas.position[elements]
     sure = well_measured(error)
-    cell = PRIOR.cell * float(np.sqrt(np.median(atlas.area[own])))
-    place = cell_of(position - position.min(0), max(cell, 1e-9))
-    _, index, count = np.unique(place, return_inverse=True, return_counts=True)
-    # The prior is asked for at the middle of a cell's elements: at one of them it would be shifted for the others.
+    edge = PRIOR.cell * float(np.sqrt(np.median(atlas.area[elements])))
+    cell = cell_of(position - position.min(0), max(edge, 1e-9))
+    _, index, count = np.unique(cell, return_inverse=True, return_counts=True)
+    # The prior is evaluated at the centroid of a cell's elements: at one of them it would be shifted for the others.
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     todo = np.flatnonzero(error > 0)
-    asked, index = np.unique(index[todo], return_inverse=True)
+    cells, index = np.unique(index[todo], return_inverse=True)
     rho = np.maximum(rho, ALBEDO.floor)
     reference, reference_error = rho[sure], error[sure]
-    around = _prior(centre[asked], position[sure], np.log(reference), without)
-    shrunk, left = rho.astype(np.float32), error.astype(np.float32)
+    prior = _prior(centre[cells], position[sure], np.log(reference), without)
+    shrunk, shrunk_error = rho.astype(np.float32), error.astype(np.float32)
     rho, error = rho[todo], error[todo]
     measured = np.isfinite(error)
     log_rho = np.log(rho)
-    middle, width = around.middle[index], around.width[index][:, None]
+    median, width = prior.median[index], prior.width[index][:, None]
     error = np.minimum(error, 1e3)[:, None]
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
     # prior gets the width that makes this element likeliest.
-    # One verdict for all channels, by their sum: a channel near 0 is all noise in its logarithm.
-    off = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(middle).sum(1, keepdims=True))
-    surprise = off**2 - (LEVELS.sigmas * error) ** 2
-    wide = np.maximum(width**2, surprise)
-    trust = (wide / (wide + error**2)).astype(np.float32)
+    # All channels are judged together, by their sum: a channel near 0 is all noise in its logarithm.
+    offset = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(median).sum(1, keepdims=True))
+    excess = offset**2 - (LEVELS.sigmas * error) ** 2
+    variance = np.maximum(width**2, excess)
+    trust = (variance / (variance + error**2)).astype(np.float32)
     if "albedo-prior" in without:
         trust[:] = 1
     trust[~measured] = 0
-    left[todo] = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
-    result = trust * log_rho + (1 - trust) * middle
+    shrunk_error[todo] = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
+    result = trust * log_rho + (1 - trust) * median
     if not {"second-colour", "albedo-prior"} & set(without):
-        if beside is not None:
-            near = beside.tree.query(centre[asked], k=min(PRIOR.neighbours, len(beside.rho)), workers=-1)[1]
-            around = around._replace(near=near.reshape(len(asked), -1))
-            reference, reference_error = np.maximum(beside.rho, ALBEDO.floor), beside.error
-        near = around, index[measured], reference, reference_error
-        result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *near)
+        if references is not None:
+            neighbours = references.tree.query(centre[cells], k=min(PRIOR.neighbours, len(references.rho)), workers=-1)[
+                1
+            ]
+            prior = prior._replace(neighbours=neighbours.reshape(len(cells), -1))
+            reference, reference_error = np.maximum(references.rho, ALBEDO.floor), references.error
+        mixture = prior, index[measured], reference, reference_error
+        result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *mixture)
     shrunk[todo] = np.exp(result)
-    return shrunk, left
+    return shrunk, shrunk_error

@@ -27,27 +27,29 @@ def shrunk_to_class(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, class_o
     result = rho.copy()
     members: dict[str, list[np.ndarray]] = {}
     for object_id, name in class_of.items():
-        own = atlas.elements_of(object_id)
-        if measured[own].any():
-            members.setdefault(name, []).append(own)
-    for alike in members.values():
-        if len(alike) > 1:
-            for own, factor in zip(alike, _factors(atlas, rho, [own[measured[own]] for own in alike]), strict=True):
-                result[own] *= factor
+        elements = atlas.elements_of(object_id)
+        if measured[elements].any():
+            members.setdefault(name, []).append(elements)
+    for group in members.values():
+        if len(group) > 1:
+            for elements, factor in zip(
+                group, _factors(atlas, rho, [elements[measured[elements]] for elements in group]), strict=True
+            ):
+                result[elements] *= factor
     return result
 
 
 def _factors(atlas: Atlas, rho: np.ndarray, measured: Sequence[np.ndarray]) -> np.ndarray:
-    """What the albedo of a class's k members is to be multiplied by, (k,) float32."""
-    colour = np.log(np.maximum([np.median(rho[own], 0) for own in measured], ALBEDO.floor))
-    area = np.array([atlas.area[own].sum() for own in measured])
+    """Factors by which the albedo of a class's k members is shrunk, (k,) float32."""
+    colour = np.log(np.maximum([np.median(rho[elements], 0) for elements in measured], ALBEDO.floor))
+    area = np.array([atlas.area[elements].sum() for elements in measured])
     # E errs by the place: a large member lies in several.
     variance = np.minimum(CLASS_PRIOR.of_place**2 / area, CLASS_PRIOR.most**2)
     weight = 1 / variance
     # Paints that differ in one channel differ.
-    off = np.square(colour - np.average(colour, 0, weight)).max(1)
-    excess = (weight * off).sum() - (len(colour) - 1)
+    deviation = np.square(colour - np.average(colour, 0, weight)).max(1)
+    excess = (weight * deviation).sum() - (len(colour) - 1)
     between = max(excess / (weight.sum() - np.square(weight).sum() / weight.sum()), 0.0)
     level = colour.mean(1)
-    middle = np.average(level, weights=1 / (variance + between))
-    return np.exp(variance / (between + variance) * (middle - level)).astype(np.float32)
+    class_level = np.average(level, weights=1 / (variance + between))
+    return np.exp(variance / (between + variance) * (class_level - level)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What the albedo's prior is told; what each part gains: docs/ablation.md."""
+"""Parameters of the albedo's prior; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

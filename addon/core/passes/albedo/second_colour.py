@@ -21,16 +21,16 @@ BLOCK: Block[int] = 1 << 11
 class Neighbourhood(NamedTuple):
     """What is around m places: log albedo's median (m, 3) and width (m,), and the neighbours themselves, (m, k) int."""
 
-    middle: np.ndarray
+    median: np.ndarray
     width: np.ndarray
-    near: np.ndarray
+    neighbours: np.ndarray
 
 
 def shrunk_to_second_colour(
     shrunk: np.ndarray,
     rho: np.ndarray,
     error: np.ndarray,
-    around: Neighbourhood,
+    prior: Neighbourhood,
     cell: np.ndarray,
     reference: np.ndarray,
     reference_error: np.ndarray,
@@ -59,48 +59,52 @@ def shrunk_to_second_colour(
     -------
     (m, 3)
     """
-    ground, width, near = np.exp(around.middle), around.width, around.near
-    other = np.empty(near.shape, bool)
+    ground, width, neighbours = np.exp(prior.median), prior.width, prior.neighbours
+    other = np.empty(neighbours.shape, bool)
     # Where a reference was cut off E is wrong; an error may be as large as a float holds. Such tell no colour.
-    uncut, least = reference.max(1) < MAX_ALBEDO, np.square(LEVELS.likely * reference_error, dtype=np.float64)
+    unclamped, tolerance = reference.max(1) < MAX_ALBEDO, np.square(LEVELS.likely * reference_error, dtype=np.float64)
 
-    def far(part: slice) -> None:
-        beside = near[part]
-        limit = (LEVELS.likely * width[part, None]) ** 2 + least[beside]
-        other[part] = (_apart(reference[beside], ground[part, None]) > limit) & uncut[beside]
+    def mark(part: slice) -> None:
+        index = neighbours[part]
+        limit = (LEVELS.likely * width[part, None]) ** 2 + tolerance[index]
+        other[part] = (_squared_difference(reference[index], ground[part, None]) > limit) & unclamped[index]
 
-    for_blocks(far, len(near), BLOCK, 0)
+    for_blocks(mark, len(neighbours), BLOCK, 0)
     share = other.mean(1)
     real = np.clip(1 - SECOND_COLOUR.by_chance / np.maximum(share, 1e-9), 0, 1)
     result = shrunk.copy()
     todo = np.flatnonzero(real[cell] > 0)
 
     def draw(part: slice) -> None:
-        own = todo[part]
-        at = cell[own]
-        beside, value = reference[near[at]], rho[own]
-        local = (SECOND_COLOUR.local * error[own]) ** 2
-        of_ground = (1 - real[at] * share[at]) * _normal(_apart(value, ground[at]), local + width[at] ** 2)
-        away = _apart(value[:, None], beside)
+        elements = todo[part]
+        at = cell[elements]
+        colours, value = reference[neighbours[at]], rho[elements]
+        local = (SECOND_COLOUR.local * error[elements]) ** 2
+        of_ground = (1 - real[at] * share[at]) * _normal_density(
+            _squared_difference(value, ground[at]), local + width[at] ** 2
+        )
+        distance = _squared_difference(value[:, None], colours)
         of_other = (
-            (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + SECOND_COLOUR.apart**2)[:, None])
+            (real[at] / neighbours.shape[1])[:, None]
+            * other[at]
+            * _normal_density(distance, (local + SECOND_COLOUR.apart**2)[:, None])
         )
         of_ground += SECOND_COLOUR.unexplained
         total = of_ground + of_other.sum(1)
-        drawn = (of_other[:, :, None] * np.log(beside)).sum(1)
+        drawn = (of_other[:, :, None] * np.log(colours)).sum(1)
         trust = (SECOND_COLOUR.apart**2 / (SECOND_COLOUR.apart**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
-        result[own] = (of_ground[:, None] * shrunk[own] + as_other) / total[:, None]
+        result[elements] = (of_ground[:, None] * shrunk[elements] + as_other) / total[:, None]
 
     for_blocks(draw, len(todo), BLOCK, 0)
     return result
 
 
-def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _squared_difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Squared relative difference of two colours: that of their lengths where they are of one hue."""
     return ((a - b) ** 2).sum(-1) / np.sqrt((a**2).sum(-1) * (b**2).sum(-1))
 
 
-def _normal(square: np.ndarray, variance: np.ndarray) -> np.ndarray:
+def _normal_density(square: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Density of a normal distribution at a squared distance, but for a factor."""
     return np.exp(-0.5 * square / variance) / np.sqrt(variance)

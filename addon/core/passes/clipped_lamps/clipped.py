@@ -21,12 +21,12 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) ->
     Not by the tier: where poses are off, a few pixels of an edge reach far into a lamp that all others show clipped.
     """
     bounds = {}
-    mostly = lit.seen & (lit.clipped > 0.5)
-    for object_id in np.setdiff1d(atlas.object_id[mostly], list(but)):
-        own = atlas.elements_of(int(object_id))
-        own = own[lit.seen[own]]
-        clipped = own[mostly[own]]
-        if 2 * atlas.area[clipped].sum() > atlas.area[own].sum():
+    mostly_clipped = lit.seen & (lit.clipped > 0.5)
+    for object_id in np.setdiff1d(atlas.object_id[mostly_clipped], list(but)):
+        elements = atlas.elements_of(int(object_id))
+        elements = elements[lit.seen[elements]]
+        clipped = elements[mostly_clipped[elements]]
+        if 2 * atlas.area[clipped].sum() > atlas.area[elements].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds
 
@@ -34,9 +34,9 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) ->
 def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
     """The same as if no frame had seen these objects."""
     hidden = np.isin(atlas.object_id, objects)
-    blank = np.where(hidden[:, None], np.float32(np.nan), lit.radiance)
+    radiance = np.where(hidden[:, None], np.float32(np.nan), lit.radiance)
     return replace(
-        lit, radiance=blank, count=np.where(hidden, 0, lit.count).astype(np.int32),
+        lit, radiance=radiance, count=np.where(hidden, 0, lit.count).astype(np.int32),
         tier=np.where(hidden, -1, lit.tier).astype(np.int8),
     )  # fmt: skip
 
@@ -61,16 +61,16 @@ def shade_clipped(
     bounds = clipped_objects(lit, atlas, but)
     if not bounds:
         return shade(lit, ())
-    found = shade(unseen(lit, atlas, list(bounds)), bounds)
+    shading = shade(unseen(lit, atlas, list(bounds)), bounds)
     solved = {
-        lamp.object_id for lamp in found.lamps
+        lamp.object_id for lamp in shading.lamps
         if lamp.object_id in bounds and float(lamp.radiance @ LUMINANCE) >= bounds[lamp.object_id]
     }  # fmt: skip
     if len(solved) < len(bounds):
         # Once more, as the first run had nothing where those that were not solved for are: their bound lights the
         # others, and has to be there when these are solved for. Where all were solved, the first run stands.
-        found = shade(unseen(lit, atlas, list(solved)) if solved else lit, solved)
+        shading = shade(unseen(lit, atlas, list(solved)) if solved else lit, solved)
 
     return replace(
-        found, lamps=tuple(replace(lamp, clipped=lamp.clipped or lamp.object_id in bounds) for lamp in found.lamps)
+        shading, lamps=tuple(replace(lamp, clipped=lamp.clipped or lamp.object_id in bounds) for lamp in shading.lamps)
     )

@@ -1,4 +1,4 @@
-"""Patches that the sensor clipped or that are far brighter than the rest, of a mesh that tells of no objects.
+"""Patches that the sensor clipped or that are far brighter than the rest, of a mesh without objects.
 
 In a fused mesh ceiling lamps and windows are of one piece with the rest. What nearly all frames
 that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none,
@@ -54,13 +54,13 @@ PATCHES = PatchParams()
 def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDiffuse) -> Patches:
     """Connected triangles that nearly all frames show clipped, or that are bright; `lookup` is the atlas's."""
     count = len(mesh.triangles)
-    told = np.where(lit.seen, atlas.area, 0)
-    apart = np.maximum(lit.clipped, _bright(atlas, lit))
-    of_triangle = np.bincount(atlas.triangle, told, count)
-    share = np.bincount(atlas.triangle, told * apart, count) / np.maximum(of_triangle, 1e-20)
+    seen_area = np.where(lit.seen, atlas.area, 0)
+    score = np.maximum(lit.clipped, _bright(atlas, lit))
+    triangle_area = np.bincount(atlas.triangle, seen_area, count)
+    share = np.bincount(atlas.triangle, seen_area * score, count) / np.maximum(triangle_area, 1e-20)
     # A triangle too small for an element of its own shows one beside it.
-    bare, beside = lookup.bare
-    share[bare] = np.where(lit.seen[beside], apart[beside], 0)
+    bare, nearest = lookup.bare
+    share[bare] = np.where(lit.seen[nearest], score[nearest], 0)
     # At a patch's edge poses that are off mix in what lies beside it: of a ceiling lamp's 0.27 square metres 0.285
     # have more than .3, 0.279 more than .5 and 0.261 more than .7, and none of the wall.
     chosen = np.flatnonzero(share > 0.5)
@@ -69,36 +69,38 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     label = np.full(count, -1)
     label[chosen] = connected(weld(mesh.vertices)[mesh.triangles[chosen]])
     of_element = label[atlas.triangle]
-    own = (of_element >= 0) & lit.seen
+    inside = (of_element >= 0) & lit.seen
     parts = int(label.max()) + 1
-    elements = np.bincount(of_element[own], minlength=parts)
-    core = np.bincount(of_element[own & (apart > PATCHES.core)], minlength=parts)
-    area = np.bincount(of_element[own], atlas.area[own], parts)
-    enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
-    enough = enough[np.argsort(-area[enough], kind="stable")]
-    ends = (one for one in enough if not _fades(atlas, lit, of_element, one))
-    kept = np.array(list(islice(ends, LEVELS.most)), int)
+    elements = np.bincount(of_element[inside], minlength=parts)
+    core = np.bincount(of_element[inside & (score > PATCHES.core)], minlength=parts)
+    area = np.bincount(of_element[inside], atlas.area[inside], parts)
+    candidates = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
+    candidates = candidates[np.argsort(-area[candidates], kind="stable")]
+    lamps = (patch for patch in candidates if not _fades(atlas, lit, of_element, patch))
+    patches = np.array(list(islice(lamps, LEVELS.most)), int)
     first = int(mesh.object_id.max()) + 1
     number = np.full(parts, -1)
-    number[kept] = first + np.arange(len(kept))
+    number[patches] = first + np.arange(len(patches))
     triangle = np.flatnonzero(np.where(label >= 0, number[label], -1) >= 0)
     return Patches(triangle.astype(np.int32), number[label[triangle]].astype(np.int32))
 
 
-def _fades(atlas: Atlas, lit: LitDiffuse, patch: np.ndarray, one: int) -> bool:
-    """Whether `one` of the patches ((n,) int of each element, -1 for none) is about as bright as what is around it."""
-    own = np.flatnonzero((patch == one) & lit.seen)
+def _fades(atlas: Atlas, lit: LitDiffuse, patch_of: np.ndarray, patch: int) -> bool:
+    """Whether a `patch` is about as bright as its surround; `patch_of` ((n,) int): each element's, -1 for none."""
+    elements = np.flatnonzero((patch_of == patch) & lit.seen)
     near, far = np.multiply(PATCHES.beside, atlas.texel_edge)
-    place, normal = atlas.position[own], atlas.normal[own].mean(0)
-    within = ((atlas.position > place.min(0) - far) & (atlas.position < place.max(0) + far)).all(1)
-    others = np.flatnonzero(within & (patch < 0) & lit.seen)
+    position, normal = atlas.position[elements], atlas.normal[elements].mean(0)
+    in_box = ((atlas.position > position.min(0) - far) & (atlas.position < position.max(0) + far)).all(1)
+    others = np.flatnonzero(in_box & (patch_of < 0) & lit.seen)
     others = others[atlas.normal[others] @ normal > 0.9 * np.linalg.norm(normal)]
-    away, _ = cKDTree(place).query(atlas.position[others], distance_upper_bound=far)
-    around = others[(away > near) & np.isfinite(away)]
-    if len(around) < LEVELS.few:
+    distance, _ = cKDTree(position).query(atlas.position[others], distance_upper_bound=far)
+    surround = others[(distance > near) & np.isfinite(distance)]
+    if len(surround) < LEVELS.few:
         return False
-    sent, beside = (float(np.median(lit.radiance[which] @ LUMINANCE)) for which in (own, around))
-    return beside > PATCHES.fades * sent
+    patch_radiance, surround_radiance = (
+        float(np.median(lit.radiance[group] @ LUMINANCE)) for group in (elements, surround)
+    )
+    return surround_radiance > PATCHES.fades * patch_radiance
 
 
 def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
@@ -111,6 +113,6 @@ def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
 
 
 def told_of(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
-    """Those of the patches whose radiance frames tell: most of what they saw of them is not clipped."""
-    own = {one: lit.seen & (atlas.object_id == one) for one in patches}
-    return [one for one, seen in own.items() if np.median(lit.clipped[seen]) <= 0.5]
+    """The patches whose radiance was measured: most of what frames saw of them is not clipped."""
+    seen_of = {patch: lit.seen & (atlas.object_id == patch) for patch in patches}
+    return [patch for patch, seen in seen_of.items() if np.median(lit.clipped[seen]) <= 0.5]

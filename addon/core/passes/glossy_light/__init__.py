@@ -1,1 +1,1 @@
-"""What glossy things reflect onto the room beyond what their L_d says."""
+"""What glossy surfaces reflect onto the room beyond their L_d."""

@@ -1,13 +1,13 @@
-"""The light of bright things by way of glossy ones, followed from where it starts (photon mapping, Jensen 1996).
+"""Light of bright surfaces by way of glossy ones, followed from its source (photon mapping, Jensen 1996).
 
 A lamp's highlight on a metal is a point of light that one ray in thousands meets by chance, and it may throw a good
-part of a room's light. So photons are sent from the bright triangles; what they meet that is glossy sends them on by
-its lobe, and where they come to lie they are light. Each carries pi L / (number * density) at first, and on its way
+part of a room's light. So photons are sent from the bright triangles; the glossy elements that they meet scatter
+them by their lobe, and where they land they are irradiance. Each carries pi L / (number * density) at first, and then
 
     f <n,wo> / p(wo),    of GGX 2 G1(n.wo) F <n,wo>,
 
-as directions are drawn from the lobe's visible normals (Heitz, JCGT 2018; f = G D F of `paper.brdf`). A glossy thing
-that is itself bright was taken to send its L_d; what of that is its lobe's goes by photons of negative power.
+as directions are drawn from the lobe's visible normals (Heitz, JCGT 2018; f = G D F of `paper.brdf`). A glossy surface
+that is itself bright was taken to send its L_d; the lobe's part of that goes by photons of negative power.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Gloss:
         0: nothing.
     f0 : (n, 3) float32
     inside : (n, 3) float32
-        What of the L_d that it is taken to send was its lobe's.
+        The lobe's part of the L_d that it is taken to send.
     kind : (n,) int8 or int
         Which of the `microfacets`.
     """
@@ -55,15 +55,15 @@ class Gloss:
     microfacets: tuple[Microfacets, ...] = (GGX,)
     kind: np.ndarray | int = 0
 
-    def alike(self, element: np.ndarray) -> Iterator[tuple[np.ndarray, Microfacets, float]]:
-        """Those of glossy elements that have one lobe: indices into `element`, microfacets, alpha."""
+    def by_lobe(self, element: np.ndarray) -> Iterator[tuple[np.ndarray, Microfacets, float]]:
+        """Glossy elements by lobe: indices into `element`, microfacets, alpha."""
         alpha = self.alpha[element]
         kind = np.broadcast_to(self.kind, self.alpha.shape)[element]
         for width in np.unique(alpha[alpha > 0]):
             for number, microfacets in enumerate(self.microfacets):
-                own = np.flatnonzero((alpha == width) & (kind == number))
-                if len(own):
-                    yield own, microfacets, float(width)
+                index = np.flatnonzero((alpha == width) & (kind == number))
+                if len(index):
+                    yield index, microfacets, float(width)
 
 
 @dataclass(frozen=True)
@@ -105,74 +105,74 @@ def caustics(
         return np.zeros((count, 3), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
-    fallen, power = [], []
+    landed, power = [], []
     for start in range(0, photons, AT_ONCE):
         part = cube[start : start + AT_ONCE]
         pick = sample_bright(bright, part[None, :, :3])
         normal = bright.normal[pick.index]
-        ways = to_world(cosine_hemisphere(part[:, None, 3:]), normal)[:, 0]
+        direction = to_world(cosine_hemisphere(part[:, None, 3:]), normal)[:, 0]
         share = (np.float32(np.pi) / (photons * pick.density))[:, None]
         sender = room.lookup(pick.triangle, pick.u, pick.v)
         origin = room.scene.off_surface(pick.point, normal)
-        # What of a bright thing's light is its lobe's comes by photons from elsewhere.
-        own = np.maximum(room.radiance[sender] - gloss.inside[sender], 0)
-        sent = _Light(origin, ways, np.concatenate([own, -gloss.inside[sender]], 1) * share)
-        element, place, at = _met(room, sent)
-        fallen.append(element)
-        power.append(sent.power[at, 3:])
+        # The lobe's part of a bright surface's light comes by photons from elsewhere.
+        diffuse = np.maximum(room.radiance[sender] - gloss.inside[sender], 0)
+        outgoing = _Light(origin, direction, np.concatenate([diffuse, -gloss.inside[sender]], 1) * share)
+        element, place, index = _traced(room, outgoing)
+        landed.append(element)
+        power.append(outgoing.power[index, 3:])
         for _ in range(CAUSTICS.bounces):
-            light = _Light(place, sent.direction[at], sent.power[at, :3])
-            sent = _sent_on(room, gloss, element, light, rng)
-            if not len(sent.origin):
+            incoming = _Light(place, outgoing.direction[index], outgoing.power[index, :3])
+            outgoing = _scattered(room, gloss, element, incoming, rng)
+            if not len(outgoing.origin):
                 break
-            element, place, at = _met(room, sent)
-            fallen.append(element)
-            power.append(sent.power[at])
-    at = np.concatenate(fallen)
+            element, place, index = _traced(room, outgoing)
+            landed.append(element)
+            power.append(outgoing.power[index])
+    at = np.concatenate(landed)
     total = np.stack([np.bincount(at, values, count).astype(np.float32) for values in np.concatenate(power).T])
     return _over_cells(room.atlas, total, threads)
 
 
-def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _traced(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The elements that photons meet from the front, the places there, and which photons those are."""
     hits = room.scene.intersect(light.origin, light.direction)
     element = room.elements(hits)
     front = np.einsum("ij,ij->i", light.direction, room.normal[hits.triangle]) < -LEAST
-    at = np.flatnonzero((element >= 0) & front)
-    place = light.origin[at] + hits.distance[at, None] * light.direction[at]
-    return element[at], place, at
+    index = np.flatnonzero((element >= 0) & front)
+    place = light.origin[index] + hits.distance[index, None] * light.direction[index]
+    return element[index], place, index
 
 
-def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light, rng: np.random.Generator) -> _Light:
-    """The photons that glossy elements send on."""
+def _scattered(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light, rng: np.random.Generator) -> _Light:
+    """The photons after scattering at glossy elements."""
     glossy = np.flatnonzero(gloss.alpha[element] > 0)
     element, light = element[glossy], light.part(glossy)
     normal = room.atlas.normal[element]
     axes = np.stack([*tangent_frame(normal), normal])
-    came = -np.einsum("amj,mj->am", axes, light.direction)
-    came[2] = np.maximum(came[2], LEAST)
-    gone, share = np.zeros_like(came), np.zeros((len(element), 3), np.float32)
-    for own, microfacets, alpha in gloss.alike(element):
-        square = rng.random((2, len(own)), np.float32)
-        gone[:, own], w_h, weight = microfacets.reflect(came[:, own], square, alpha)
-        share[own] = fresnel(w_h[:, None], gloss.f0[element[own]]) * weight[:, None]
+    incoming = -np.einsum("amj,mj->am", axes, light.direction)
+    incoming[2] = np.maximum(incoming[2], LEAST)
+    outgoing, share = np.zeros_like(incoming), np.zeros((len(element), 3), np.float32)
+    for index, microfacets, alpha in gloss.by_lobe(element):
+        square = rng.random((2, len(index)), np.float32)
+        outgoing[:, index], w_h, weight = microfacets.reflect(incoming[:, index], square, alpha)
+        share[index] = fresnel(w_h[:, None], gloss.f0[element[index]]) * weight[:, None]
     alive = np.flatnonzero(share.any(1))
-    ways = np.einsum("amj,am->mj", axes[:, alive], gone[:, alive]).astype(np.float32)
+    direction = np.einsum("amj,am->mj", axes[:, alive], outgoing[:, alive]).astype(np.float32)
     origin = room.scene.off_surface(light.origin[alive], normal[alive])
-    return _Light(origin, ways, light.power[alive] * share[alive])
+    return _Light(origin, direction, light.power[alive] * share[alive])
 
 
 def _over_cells(atlas: Atlas, power: np.ndarray, threads: int) -> np.ndarray:
     """Power ((3, n)) over area, (n, 3) float32: means over cells of several shifted grids."""
-    held, area = np.zeros((3, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
+    result, area = np.zeros((3, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
 
     def add(portion: tuple[np.ndarray, np.ndarray]) -> None:
-        own, group = portion
-        for row, values in zip((*held, area), (*power, atlas.area), strict=True):
-            row[own] += np.bincount(group, values[own])[group]
+        elements, group = portion
+        for row, values in zip((*result, area), (*power, atlas.area), strict=True):
+            row[elements] += np.bincount(group, values[elements])[group]
 
     for k in range(LESS_NOISE.grids):
         for _ in ordered_map(add, cells(atlas.position, atlas.normal, k / LESS_NOISE.grids), threads):
             pass
-    held /= np.maximum(area, np.float32(1e-12))
-    return held.T
+    result /= np.maximum(area, np.float32(1e-12))
+    return result.T

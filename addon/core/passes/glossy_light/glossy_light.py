@@ -1,4 +1,4 @@
-"""What glossy things really reflect onto the room, beyond what the median over the frames says of them.
+"""What glossy surfaces really reflect onto the room, beyond their median over the frames.
 
 The light field takes a surface to send its L_d into all directions. A highlight is not in that median: a floor under a
 lamp sends it towards the ceiling, and no camera stood there; a metal sends the lamp, and its median shows a wall. Once
@@ -51,19 +51,19 @@ class Excess(LightField):
         self._inside = specular.copy()
         alpha, kind = np.zeros(len(room.atlas), np.float32), np.zeros(len(room.atlas), np.int8)
         self._f0, microfacets = np.zeros((len(room.atlas), 3), np.float32), []
-        elements, none = by_number(room.atlas.object_id), np.zeros(0, np.int64)
+        elements_of, empty = by_number(room.atlas.object_id), np.zeros(0, np.int64)
         followed = {mirror.object_id for mirror in room.mirrors}
-        for m in materials:
-            if m.model.microfacets is None or m.alpha is None or m.object_id in followed:
+        for material in materials:
+            if material.model.microfacets is None or material.alpha is None or material.object_id in followed:
                 continue
-            own = elements.get(m.object_id, none)
-            alpha[own] = max(float(m.alpha), float(GRID[0]))
-            if m.model.microfacets not in microfacets:
-                microfacets.append(m.model.microfacets)
-            kind[own] = microfacets.index(m.model.microfacets)
-            self._f0[own] = m.f0
-            if not m.model.has_diffuse:
-                self._inside[own] = room.radiance[own]
+            elements = elements_of.get(material.object_id, empty)
+            alpha[elements] = max(float(material.alpha), float(GRID[0]))
+            if material.model.microfacets not in microfacets:
+                microfacets.append(material.model.microfacets)
+            kind[elements] = microfacets.index(material.model.microfacets)
+            self._f0[elements] = material.f0
+            if not material.model.has_diffuse:
+                self._inside[elements] = room.radiance[elements]
         self._gloss = Gloss(alpha, self._f0, self._inside, tuple(microfacets), kind)
         # What bright triangles send is followed from there.
         self._aimed = self._sources.density[room.atlas.triangle] > 0
@@ -89,16 +89,16 @@ class Excess(LightField):
     ) -> np.ndarray:
         """As `LightField.arriving`; what is behind a surface gets nothing from it."""
         result = np.zeros((len(element), 3), np.float32)
-        towards = np.einsum("ij,ij->i", directions, self._room.atlas.normal[element]) < 0
-        met = np.flatnonzero((element >= 0) & towards)
-        for alike, microfacets, alpha in self._gloss.alike(element[met]):
-            at = met[alike]
-            own = element[at]
-            shown = highlight(
-                self._room, self._bright, own, -directions[at], alpha, self._f0[own], microfacets,
+        facing = np.einsum("ij,ij->i", directions, self._room.atlas.normal[element]) < 0
+        lit = np.flatnonzero((element >= 0) & facing)
+        for group, microfacets, alpha in self._gloss.by_lobe(element[lit]):
+            at = lit[group]
+            elements = element[at]
+            radiance = highlight(
+                self._room, self._bright, elements, -directions[at], alpha, self._f0[elements], microfacets,
                 rays=GLOSSY.lobe_rays, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
-            result[at] = shown - np.where(self._aimed[own, None], 0, self._inside[own])
+            result[at] = radiance - np.where(self._aimed[elements, None], 0, self._inside[elements])
         return result
 
 
@@ -139,20 +139,22 @@ def glossy_light(
         steps["count"] += 1
 
         def run(part: slice) -> None:
-            at, here = element[index[part]], seed + 7919 * steps["count"] + part.start
-            found, radius[part], _ = gather(excess, bright, atlas.position[at], atlas.normal[at], GLOSSY.rays, 0, here)
-            value[part] = level + found
+            at, block_seed = element[index[part]], seed + 7919 * steps["count"] + part.start
+            gathered_excess, radius[part], _ = gather(
+                excess, bright, atlas.position[at], atlas.normal[at], GLOSSY.rays, 0, block_seed
+            )
+            value[part] = level + gathered_excess
 
         for_blocks(run, len(index), 1 << 11, threads, rounds)
         rounds.next()
         return value, radius
 
-    def around(index: np.ndarray) -> np.ndarray:
+    def evaluated(index: np.ndarray) -> np.ndarray:
         finest = finest_spacing(atlas, GLOSSY.finest_share)
         at = element[index]
         return interpolated(atlas.position[at], atlas.normal[at], lambda i: gathered(index[i]), finest, threads)[0]
 
-    found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf) - level
+    added = TexelBlocks(atlas, element, threads).evaluate(evaluated, block_step(atlas), np.inf) - level
     if "caustics" not in without:
-        found += excess.from_bright(threads)[element]
-    return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)
+        added += excess.from_bright(threads)[element]
+    return np.maximum(added, -GLOSSY.most_taken * irradiance).astype(np.float32)

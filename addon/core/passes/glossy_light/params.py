@@ -1,4 +1,4 @@
-"""What the light of glossy things is followed with; what each part gains: docs/ablation.md."""
+"""Parameters of the light that glossy surfaces reflect; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

@@ -56,11 +56,11 @@ def hinges_of(faces: np.ndarray) -> Hinges:
     """Edges with just two triangles; borders and edges where three or more meet are left out."""
     corners = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])
     low, high = np.minimum(corners[:, 0], corners[:, 1]), np.maximum(corners[:, 0], corners[:, 1])
-    name = low.astype(np.int64) * (int(faces.max()) + 1) + high
-    order = np.argsort(name, kind="stable")
-    name, opposite = name[order], corners[order, 2]
-    start = np.flatnonzero(np.r_[True, name[1:] != name[:-1]])
-    start = start[np.diff(np.r_[start, len(name)]) == 2]
+    key = low.astype(np.int64) * (int(faces.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    key, opposite = key[order], corners[order, 2]
+    start = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+    start = start[np.diff(np.r_[start, len(key)]) == 2]
     start = start[opposite[start] != opposite[start + 1]]  # a triangle listed twice
     return Hinges(low[order][start], high[order][start], opposite[start], opposite[start + 1])
 
@@ -78,7 +78,7 @@ def dihedral(
     Returns
     -------
     theta : (e,) float
-        Radians, 0 where flat, with a sign for the way that it bends.
+        Radians, 0 where flat, signed by the direction in which it bends.
     gradient : four (e, 3) arrays
         Of theta by the points a, b, c and d, radians per metre (Bridson et al. 2003).
     """
@@ -88,58 +88,59 @@ def dihedral(
     along = edge / np.sqrt(squared)[:, None]
 
     def side(opposite: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where a triangle's height meets the edge (share of its length), the unit way along it, and the height."""
+        """Where a triangle's height meets the edge (share of its length), the unit vector along it, and the height."""
         arm = points[opposite] - start
         foot = (arm * edge).sum(1) / squared
         arm -= foot[:, None] * edge
         height = np.linalg.norm(arm, axis=1)
         return foot[:, None], arm / np.maximum(height, 1e-12)[:, None], np.maximum(height, max(floor, 1e-12))[:, None]
 
-    foot_c, way_c, height_c = side(hinges.c)
-    foot_d, way_d, height_d = side(hinges.d)
+    foot_c, arm_c, height_c = side(hinges.c)
+    foot_d, arm_d, height_d = side(hinges.d)
     # Turned alike by the edge, not by the windings.
-    normal_c, normal_d = np.cross(along, way_c), np.cross(way_d, along)
+    normal_c, normal_d = np.cross(along, arm_c), np.cross(arm_d, along)
     theta = np.arctan2((np.cross(normal_c, normal_d) * along).sum(1), (normal_c * normal_d).sum(1))
-    by_c, by_d = -normal_c / height_c, -normal_d / height_d
-    by_a = -(1 - foot_c) * by_c - (1 - foot_d) * by_d
-    by_b = -foot_c * by_c - foot_d * by_d
-    return theta, (by_a, by_b, by_c, by_d)
+    grad_c, grad_d = -normal_c / height_c, -normal_d / height_d
+    grad_a = -(1 - foot_c) * grad_c - (1 - foot_d) * grad_d
+    grad_b = -foot_c * grad_c - foot_d * grad_d
+    return theta, (grad_a, grad_b, grad_c, grad_d)
 
 
-def _linear(
+def _normal_equations(
     points: np.ndarray, normal: np.ndarray, hinges: Hinges, noise: float, scale: float
 ) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:
-    """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
+    """Angles, their weights, their Jacobian by each point's step along its normal, and the normal equations' matrix."""
     count = len(points)
     theta, gradient = dihedral(points, hinges, noise)
     weight = 1 / (scale**2 + theta**2)
     ends = (hinges.a, hinges.b, hinges.c, hinges.d)
-    values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
+    values = np.concatenate([(derivative * normal[point]).sum(1) for derivative, point in zip(gradient, ends)])
     rows = np.tile(np.arange(len(theta)), 4)
-    change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
-    system = sparse.diags(np.full(count, 1 / noise**2)) + change.T @ sparse.diags(weight) @ change
-    return theta, weight, change, system.tocsr()
+    jacobian = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
+    system = sparse.diags(np.full(count, 1 / noise**2)) + jacobian.T @ sparse.diags(weight) @ jacobian
+    return theta, weight, jacobian, system.tocsr()
 
 
-def _solved(system: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
+def _solve(system: sparse.csr_matrix, rhs: np.ndarray) -> np.ndarray:
     """The solution of a symmetric positive definite system, by conjugate gradients."""
-    scaled = sparse.diags(1 / system.diagonal())
-    return cg(system, right, rtol=DENOISE.tolerance, maxiter=LEVELS.steps, M=scaled)[0]
+    preconditioner = sparse.diags(1 / system.diagonal())
+    return cg(system, rhs, rtol=DENOISE.tolerance, maxiter=LEVELS.steps, M=preconditioner)[0]
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
-    way = points - measured
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    return measured + way * np.minimum(1, farthest / np.maximum(length, 1e-30))
+    """Points held within `farthest` of where they were measured."""
+    offset = points - measured
+    length = np.linalg.norm(offset, axis=1, keepdims=True)
+    return measured + offset * np.minimum(1, farthest / np.maximum(length, 1e-30))
 
 
-def _large(points: np.ndarray, faces: np.ndarray, least: float) -> np.ndarray:
-    """Triangles of connected parts whose box has a diagonal of at least `least`, (t,) bool."""
-    parts, part = connected_components(ring_of(faces, len(points)), directed=False)
-    low, high = np.full((parts, 3), np.inf), np.full((parts, 3), -np.inf)
+def _large(points: np.ndarray, faces: np.ndarray, min_size: float) -> np.ndarray:
+    """Triangles of connected parts whose box has a diagonal of at least `min_size`, (t,) bool."""
+    count, part = connected_components(ring_of(faces, len(points)), directed=False)
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, part, points)
     np.maximum.at(high, part, points)
-    return (np.linalg.norm(high - low, axis=1) >= least)[part[faces[:, 0]]]
+    return (np.linalg.norm(high - low, axis=1) >= min_size)[part[faces[:, 0]]]
 
 
 def without_noise(mesh: Mesh, without: Collection[str] = ()) -> tuple[Mesh, float]:
@@ -165,24 +166,24 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     """
     if not noise > 0:
         return mesh.vertices
-    measured, faces, place = welded(mesh, one_place(mesh.vertices))
+    measured, faces, point_of = welded(mesh, one_place(mesh.vertices))
     # Welding makes triangles that are smaller than its grid into edges.
-    real = (faces != np.roll(faces, 1, 1)).all(1)
+    valid = (faces != np.roll(faces, 1, 1)).all(1)
     # Parts no larger than outliers have no shape left to find, and stay as they are.
-    real[real] = _large(measured, faces[real], LEVELS.sigmas * noise)
-    faces = faces[real]
+    valid[valid] = _large(measured, faces[valid], LEVELS.sigmas * noise)
+    faces = faces[valid]
     if not len(faces):
         return mesh.vertices
     hinges = hinges_of(faces)
     points = measured
     for scale in SCALES:
         normal = point_normals(points, faces)
-        theta, weight, change, system = _linear(points, normal, hinges, noise, scale)
-        gone = ((points - measured) * normal).sum(1)
-        step = _solved(system, -gone * (1 / noise**2) - change.T @ (weight * theta))
+        theta, weight, jacobian, system = _normal_equations(points, normal, hinges, noise, scale)
+        displacement = ((points - measured) * normal).sum(1)
+        step = _solve(system, -displacement * (1 / noise**2) - jacobian.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, LEVELS.sigmas * noise)
     if "sheets" not in without:
         points = onto_sheets(measured, points, faces, noise)
-    return mesh.vertices + (points - measured)[place]
+    return mesh.vertices + (points - measured)[point_of]

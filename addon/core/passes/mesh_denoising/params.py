@@ -1,4 +1,4 @@
-"""What a scan's noise is taken out with; what each part gains: docs/ablation.md."""
+"""Parameters of the mesh denoising; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

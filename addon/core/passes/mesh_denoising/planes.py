@@ -1,4 +1,4 @@
-"""Flat parts of a noisy mesh, found as wholes and made flat.
+"""Planar regions of a noisy mesh, found and made flat.
 
 Dihedral angles alone (`denoise`) leave a crease of a degree across a mirror of two triangles, and where triangles are
 as small as the noise they leave normals that wander. A plane through all the points of a flat part knows better.
@@ -59,15 +59,15 @@ def neighbours_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = len(faces)
     edges = np.stack([faces, faces[:, [1, 2, 0]]], 2).reshape(-1, 2)
     low, high = edges.min(1), edges.max(1)
-    name = low.astype(np.int64) * (int(faces.max()) + 1) + high
-    order = np.argsort(name, kind="stable")
-    start = np.flatnonzero(np.r_[True, name[order][1:] != name[order][:-1]])
+    key = low.astype(np.int64) * (int(faces.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    start = np.flatnonzero(np.r_[True, key[order][1:] != key[order][:-1]])
     start = start[np.diff(np.r_[start, len(order)]) == 2]
-    one, other = order[start], order[start + 1]
-    across, alike = np.full(3 * count, -1), np.ones(3 * count, np.int8)
-    across[one], across[other] = other // 3, one // 3
-    alike[one] = alike[other] = np.where(edges[one, 0] == edges[other, 0], -1, 1)
-    return across.reshape(-1, 3), alike.reshape(-1, 3)
+    first, second = order[start], order[start + 1]
+    across, winding = np.full(3 * count, -1), np.ones(3 * count, np.int8)
+    across[first], across[second] = second // 3, first // 3
+    winding[first] = winding[second] = np.where(edges[first, 0] == edges[second, 0], -1, 1)
+    return across.reshape(-1, 3), winding.reshape(-1, 3)
 
 
 class Grower:
@@ -84,50 +84,52 @@ class Grower:
 
     def __init__(self, points: np.ndarray, faces: np.ndarray, noise: float):
         self.points, self.faces, self.noise = points, faces, noise
-        self.across, self.alike = neighbours_of(faces)
+        self.across, self.winding = neighbours_of(faces)
         corners = points[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        double = np.linalg.norm(normal, axis=1)
-        self.normal, self.area = normal / np.maximum(double, 1e-30)[:, None], double / 2
+        double_area = np.linalg.norm(normal, axis=1)
+        self.normal, self.area = normal / np.maximum(double_area, 1e-30)[:, None], double_area / 2
         self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
-        tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
+        tilt = noise * self.length.max(1) / np.maximum(double_area, 1e-30)  # noise / height
         # However low a triangle: front and sides of a thin plate are pi / 2 apart.
-        self.least = np.cos(np.minimum(PLANES.turn + tilt, np.pi / 4))
+        self.min_cosine = np.cos(np.minimum(PLANES.turn + tilt, np.pi / 4))
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
     def seeds(self) -> np.ndarray:
         """Triangles with a neighbour that faces their way, the largest first."""
-        alike = (self.normal[:, None] * self.normal[self.across]).sum(2) * self.alike > self.least[self.across]
-        able = np.flatnonzero((alike & (self.across >= 0)).any(1))
-        return able[np.argsort(-self.area[able], kind="stable")]
+        parallel = (self.normal[:, None] * self.normal[self.across]).sum(2) * self.winding > self.min_cosine[
+            self.across
+        ]
+        seeds = np.flatnonzero((parallel & (self.across >= 0)).any(1))
+        return seeds[np.argsort(-self.area[seeds], kind="stable")]
 
     def grow(self, seed: int) -> np.ndarray:
         """The triangles around `seed` that may lie in one plane with it; those of other sheets are not free."""
         self._run += 1
         self._seen[seed] = self._run
-        side, count = self.normal[seed], 0
+        facing, count = self.normal[seed], 0
         moments = Moments(self.points[self.faces[seed, 0]])
         front, sign = np.array([seed]), np.ones(1)
         region = []
         while len(front):
             region.append(front)
-            new = np.unique(self.faces[front])
-            new = new[self._met[new] != self._run]
-            self._met[new] = self._run
-            moments.add(self.points[new])
+            points = np.unique(self.faces[front])
+            points = points[self._met[points] != self._run]
+            self._met[points] = self._run
+            moments.add(self.points[points])
             if moments.count > 1.2 * count:
                 mean, axes, scatter = moments.plane()
-                axes[0] *= 1 if axes[0] @ side > 0 else -1
+                axes[0] *= 1 if axes[0] @ facing > 0 else -1
                 count = moments.count
-            near, turn = self.across[front].ravel(), (sign[:, None] * self.alike[front]).ravel()
-            fit = (near >= 0) & self.free[near] & (self._seen[near] != self._run)
-            fit &= turn * (self.normal[near] @ axes[0]) > self.least[near]
-            near, first = np.unique(near[fit], return_index=True)
-            arm = (self.points[self.faces[near]] - mean) @ axes.T
+            adjacent, winding = self.across[front].ravel(), (sign[:, None] * self.winding[front]).ravel()
+            fit = (adjacent >= 0) & self.free[adjacent] & (self._seen[adjacent] != self._run)
+            fit &= winding * (self.normal[adjacent] @ axes[0]) > self.min_cosine[adjacent]
+            adjacent, first = np.unique(adjacent[fit], return_index=True)
+            arm = (self.points[self.faces[adjacent]] - mean) @ axes.T
             variance = 1 + 1 / count + arm[..., 1] ** 2 / scatter[1] + arm[..., 2] ** 2 / scatter[2]
             fits = (arm[..., 0] ** 2 < (PLANES.reach * self.noise) ** 2 * variance).all(1)
-            front, sign = near[fits], turn[fit][first][fits]
+            front, sign = adjacent[fits], winding[fit][first][fits]
             self._seen[front] = self._run
         region = np.concatenate(region)
         self.tried[region] = True
@@ -160,14 +162,14 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float
     x, y = x / spread[1], y / spread[0]
     flat = np.stack([np.ones(n), x, y], 1)
     bend = np.stack([x * x, x * y, y * y], 1)
-    taken = np.linalg.lstsq(flat, bend, rcond=None)[0]
-    u, s, vt = np.linalg.svd(bend - flat @ taken, full_matrices=False)
-    told = s > PLANES.determined * np.sqrt(n)
-    part = (u.T @ z)[told]
-    # One in a row, by the metre: each determined term, alone.
-    terms = np.concatenate([-(taken @ vt[told].T).T, vt[told]], 1)
+    coefficients = np.linalg.lstsq(flat, bend, rcond=None)[0]
+    u, s, vt = np.linalg.svd(bend - flat @ coefficients, full_matrices=False)
+    determined = s > PLANES.determined * np.sqrt(n)
+    amplitude = (u.T @ z)[determined]
+    # Each determined term alone, one in a row, per metre.
+    terms = np.concatenate([-(coefficients @ vt[determined].T).T, vt[determined]], 1)
     terms /= np.r_[1, spread[1], spread[0], spread[1] ** 2, spread.prod(), spread[0] ** 2]
-    c = (part / s[told]) @ terms
+    c = (amplitude / s[determined]) @ terms
     x, y = x * spread[1], y * spread[0]
 
     def slope(c: np.ndarray) -> float:
@@ -175,9 +177,9 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float
         along, across = c[1] + 2 * c[3] * x + c[4] * y, c[2] + c[4] * x + 2 * c[5] * y
         return float(np.sqrt(np.mean(along**2 + across**2)))
 
-    chance = noise * np.sqrt(sum(slope(one) ** 2 for one in terms / s[told, None]))
-    explained = (part**2).sum() / noise**2
-    total, freedom = (z**2).sum() / noise**2, n - 3 - told.sum()
+    chance = noise * np.sqrt(sum(slope(term) ** 2 for term in terms / s[determined, None]))
+    explained = (amplitude**2).sum() / noise**2
+    total, freedom = (z**2).sum() / noise**2, n - 3 - determined.sum()
     bent = explained > PLANES.bent * max(1, (total - explained) / max(freedom, 1))
     gentle = slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * PLANES.gentle
     # Chi squared within three of its standard deviations.
@@ -201,8 +203,8 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
         if grower.tried[seed] or not grower.free[seed]:
             continue
         region = grower.grow(seed)
-        own = np.unique(faces[region])
-        sheet = sheet_of(measured[own], region, float(grower.area[region].sum()), grower.outline(region), noise)
+        points = np.unique(faces[region])
+        sheet = sheet_of(measured[points], region, float(grower.area[region].sum()), grower.outline(region), noise)
         if sheet is not None:
             grower.free[region] = False
             sheets.append(sheet)
@@ -221,27 +223,27 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
     moved = smooth.copy()
     if not sheets:
         return moved
-    of = np.repeat(np.arange(len(sheets)), [len(s.faces) for s in sheets])
-    own = np.concatenate([s.faces for s in sheets])
-    around = sparse.csr_matrix((np.repeat(grower.area[own], 3), (faces[own].ravel(), np.repeat(of, 3))),
+    owner = np.repeat(np.arange(len(sheets)), [len(s.faces) for s in sheets])
+    triangles = np.concatenate([s.faces for s in sheets])
+    area = sparse.csr_matrix((np.repeat(grower.area[triangles], 3), (faces[triangles].ravel(), np.repeat(owner, 3))),
                                (len(measured), len(sheets)))  # fmt: skip
-    around.sum_duplicates()
-    first = np.asarray(around.argmax(1)).ravel()
-    largest = around.max(1).toarray().ravel()
-    pair = around.tocoo()
+    area.sum_duplicates()
+    main_sheet = np.asarray(area.argmax(1)).ravel()
+    largest = area.max(1).toarray().ravel()
+    pair = area.tocoo()
     point, sheet = pair.row, pair.col
-    normal = np.stack([one.normal for one in sheets])[sheet]
-    gap = ((smooth[point] - np.stack([one.mean for one in sheets])[sheet]) * normal).sum(1)
+    normal = np.stack([s.normal for s in sheets])[sheet]
+    gap = ((smooth[point] - np.stack([s.mean for s in sheets])[sheet]) * normal).sum(1)
     facing = np.empty((len(measured), 3))
-    main = sheet == first[point]
+    main = sheet == main_sheet[point]
     facing[point[main]] = normal[main]
     crossing = main | (np.abs((normal * facing[point]).sum(1)) < np.cos(PLANES.turn))
-    for some in (main, crossing):  # last what all of a point's sheets ask for, where it may go there
-        p, n, g = point[some], PLANES.stiff * normal[some], PLANES.stiff * gap[some]
-        right = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
+    for chosen in (main, crossing):  # last the point where all of its sheets meet, if it may go there
+        p, n, g = point[chosen], PLANES.stiff * normal[chosen], PLANES.stiff * gap[chosen]
+        rhs = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
         system = np.stack([np.bincount(p, n[:, i] * n[:, j], len(measured)) for i in range(3) for j in range(3)], 1)
-        way = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), right[..., None])[..., 0]
-        there = smooth + way
-        fits = (largest > 0) & (np.linalg.norm(there - measured, axis=1) <= PLANES.reach * noise)
-        moved[fits] = there[fits]
+        step = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), rhs[..., None])[..., 0]
+        target = smooth + step
+        fits = (largest > 0) & (np.linalg.norm(target - measured, axis=1) <= PLANES.reach * noise)
+        moved[fits] = target[fits]
     return moved

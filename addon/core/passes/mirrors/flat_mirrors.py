@@ -23,19 +23,19 @@ from ...parallel import ordered_map
 from ...scene.model import Instance
 from ...scene.samples import Samples
 from ...significance import LEVELS
-from .mirrored import Views, sides_of, turned
+from .mirrored import Views, tangents_of, turned
 from .params import MIRRORS
 
 
 def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Point and normal ((3,) float32 each) of the plane that most of an object lies in; None if it is not flat."""
     atlas = field.atlas
-    own = atlas.elements_of(object_id)
-    if not len(own):
+    elements = atlas.elements_of(object_id)
+    if not len(elements):
         return None
-    position, normal, area = atlas.position[own], atlas.normal[own], atlas.area[own]
+    position, normal, area = atlas.position[elements], atlas.normal[elements], atlas.area[elements]
     # The plane of the largest triangle: a frame or bevel around the glass must not tilt it.
-    triangle, index = np.unique(atlas.triangle[own], return_inverse=True)
+    triangle, index = np.unique(atlas.triangle[elements], return_inverse=True)
     largest = np.argmax(np.bincount(index, area))
     at = np.flatnonzero(index == largest)
     n, point = normal[at[0]], np.median(position[at], 0)
@@ -49,34 +49,38 @@ def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray]
 def find_mirrors(
     field: LightField, lamps: tuple[Lamp, ...], samples: Samples, instances: tuple[Instance, ...], seed: int = 0
 ) -> tuple[Mirror, ...]:
-    """Flat objects whose frames show the room mirrored."""
+    """Flat objects in which frames show the mirrored room."""
     rng = np.random.default_rng(seed)
     clear = np.flatnonzero(~samples.saturated)
-    shown = by_number(field.atlas.object_id[samples.element[clear]])
+    observations_of = by_number(field.atlas.object_id[samples.element[clear]])
     glowing = {lamp.object_id for lamp in lamps}
 
-    def flat() -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    def flat_objects() -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
         for instance in instances:
             plane = None if instance.object_id in glowing else plane_of(field, instance.object_id)
             if plane is None:
                 continue
             point, normal = plane
-            own = clear[shown.get(instance.object_id, [])]
-            own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
-            elements = np.unique(samples.element[own])
+            observations = clear[observations_of.get(instance.object_id, [])]
+            observations = observations[field.atlas.normal[samples.element[observations]] @ normal > FLAT]
+            elements = np.unique(samples.element[observations])
             if len(elements) > LEVELS.of_object:
-                own = own[np.isin(samples.element[own], rng.choice(elements, LEVELS.of_object, replace=False))]
-            yield instance.object_id, point, normal, own
+                observations = observations[
+                    np.isin(samples.element[observations], rng.choice(elements, LEVELS.of_object, replace=False))
+                ]
+            yield instance.object_id, point, normal, observations
 
-    def mirror(one: tuple[int, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
-        object_id, point, normal, own = one
-        found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
-        return None if found is None else Mirror(object_id, point, *found)
+    def fitted(candidate: tuple[int, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
+        object_id, point, normal, observations = candidate
+        fit = _fit_mirror(
+            Views.of(field, samples, observations), field.atlas.normal[samples.element[observations]], normal
+        )
+        return None if fit is None else Mirror(object_id, point, *fit)
 
-    return tuple(found for found in ordered_map(mirror, flat(), 0) if found is not None)
+    return tuple(mirror for mirror in ordered_map(fitted, flat_objects(), 0) if mirror is not None)
 
 
-def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def _fit_mirror(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Normal and F0 ((3,) float32 each) of the mirror that these observations see, None if they see none.
 
     Parameters
@@ -86,18 +90,20 @@ def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.
     normal : (3,) float32
         Of the mesh's plane.
     """
-    off, own, together, f0 = views.compare(facing)
-    if not (off < own and together > MIRRORS.together and f0.mean() > MIRRORS.least_f0):
+    deviation, own_deviation, correlation, f0 = views.compare(facing)
+    if not (deviation < own_deviation and correlation > MIRRORS.together and f0.mean() > MIRRORS.least_f0):
         return None
-    sides = sides_of(normal)
-    few = views.part(np.arange(0, len(views), -(-len(views) // LEVELS.sample)))
-    by = np.zeros(2)
-    # What goes together finds the way from farther, what is least off tells it more closely.
-    for cost in (lambda way: -few.compare(way)[2], few.off):
-        first = by + MIRRORS.tilt * np.array([[0, 0], [1, 0], [0, 1]])
-        how = {"initial_simplex": first, "maxfev": MIRRORS.tilts, "xatol": 3e-4, "fatol": 1e-4}
-        by = minimize(lambda x, cost=cost: cost(turned(normal, sides, x)), by, method="Nelder-Mead", options=how).x
-    found = turned(normal, sides, by)
-    if not few.off(found) < MIRRORS.tells * few.off(normal):
-        found = np.asarray(normal, np.float32)
-    return found, np.clip(f0, 0.02, 1).astype(np.float32)
+    tangents = tangents_of(normal)
+    sample = views.part(np.arange(0, len(views), -(-len(views) // LEVELS.sample)))
+    tilt = np.zeros(2)
+    # The correlation finds the direction from farther off, the deviation more closely.
+    for cost in (lambda direction: -sample.compare(direction)[2], sample.deviation):
+        simplex = tilt + MIRRORS.tilt * np.array([[0, 0], [1, 0], [0, 1]])
+        options = {"initial_simplex": simplex, "maxfev": MIRRORS.tilts, "xatol": 3e-4, "fatol": 1e-4}
+        tilt = minimize(
+            lambda x, cost=cost: cost(turned(normal, tangents, x)), tilt, method="Nelder-Mead", options=options
+        ).x
+    best = turned(normal, tangents, tilt)
+    if not sample.deviation(best) < MIRRORS.tells * sample.deviation(normal):
+        best = np.asarray(normal, np.float32)
+    return best, np.clip(f0, 0.02, 1).astype(np.float32)

@@ -1,8 +1,8 @@
-"""Mirrors in a mesh that tells of no objects, where they are of one piece with the wall that they hang on.
+"""Mirrors in a mesh without objects, where they are of one piece with the wall that they hang on.
 
 A mirror hangs before its wall or in a frame, so it is a flat piece by itself. Of a part, which may be a chimney and its
-sides, every way that much of it faces is looked along. Each observed element is asked together with those around it
-whether they show the mirrored room, as `flat_mirrors` asks an object. Share of a piece's elements that do: two mirrors
+sides, every direction that much of it faces is tried. Each observed element is tested together with those around it
+for showing the mirrored room, as `flat_mirrors` tests an object. Share of a piece's elements that do: two mirrors
 of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at most .11.
 """
 
@@ -34,30 +34,34 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     atlas, mesh = field.atlas, field.mesh
     clear = np.flatnonzero(~samples.saturated)
     welded, normals = weld(mesh.vertices), mesh.geometry[0]
-    first, found = int(mesh.object_id.max()) + 1, [Patches.none()]
-    for number, shown in by_number(atlas.object_id[samples.element[clear]]).items():
-        seen, left = clear[shown], mesh.object_id == number
-        for normal in _facings(atlas.normal[np.unique(samples.element[seen])]):
-            flat = np.flatnonzero(left & (normals @ normal > FLAT))
-            left[flat] = False  # none is of two pieces
-            own = seen[atlas.normal[samples.element[seen]] @ normal > FLAT]
-            element, mirrored = _mirrored(Views.of(field, samples, own), normal)
+    next_id, patches = int(mesh.object_id.max()) + 1, [Patches.none()]
+    for object_id, index in by_number(atlas.object_id[samples.element[clear]]).items():
+        observations, free = clear[index], mesh.object_id == object_id
+        for normal in _facings(atlas.normal[np.unique(samples.element[observations])]):
+            flat = np.flatnonzero(free & (normals @ normal > FLAT))
+            free[flat] = False  # none is of two pieces
+            facing = observations[atlas.normal[samples.element[observations]] @ normal > FLAT]
+            element, mirrored = _mirrored(Views.of(field, samples, facing), normal)
             if mirrored.sum() < LEVELS.enough:
                 continue
             piece = np.full(len(mesh.triangles), -1)
             piece[flat] = connected(welded[mesh.triangles[flat]])
             within = piece[atlas.triangle[element]]
-            there, told = (np.bincount(within[which & (within >= 0)], minlength=1) for which in (mirrored, within >= 0))
-            there = np.pad(there, (0, len(told) - len(there)))
-            for one in np.flatnonzero((there >= LEVELS.enough) & (2 * there > told)):
-                triangle = np.flatnonzero(piece == one).astype(np.int32)
-                found.append(Patches(triangle, np.full(len(triangle), first, np.int32), np.array([first], np.int32)))
-                first += 1
-    return Patches.together(found)
+            mirroring, known = (
+                np.bincount(within[mask & (within >= 0)], minlength=1) for mask in (mirrored, within >= 0)
+            )
+            mirroring = np.pad(mirroring, (0, len(known) - len(mirroring)))
+            for label in np.flatnonzero((mirroring >= LEVELS.enough) & (2 * mirroring > known)):
+                triangle = np.flatnonzero(piece == label).astype(np.int32)
+                patches.append(
+                    Patches(triangle, np.full(len(triangle), next_id, np.int32), np.array([next_id], np.int32))
+                )
+                next_id += 1
+    return Patches.together(patches)
 
 
 def _facings(normals: np.ndarray) -> Iterator[np.ndarray]:
-    """Ways ((3,) float32, unit) that many of some normals ((n, 3)) share, the most common first."""
+    """Directions ((3,) float32, unit) that many of some normals ((n, 3)) share, the most common first."""
     while len(normals):
         cell = np.round(normals / np.sqrt(1 - FLAT**2))
         _, cell, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
@@ -70,24 +74,24 @@ def _facings(normals: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The elements ((k,) int) that views tell something of, and around which a mirror surely explains it, (k,) bool."""
-    known = views.known(normal)
-    if known is None:
+    """Elements ((k,) int) whose mirrored radiance is known, and around which a mirror surely explains it, (k,) bool."""
+    views_known = views.known(normal)
+    if views_known is None:
         return np.zeros(0, int), np.zeros(0, bool)
-    index, _, seen, shown = known
+    index, _, observed, predicted = views_known
     element, group, count = np.unique(views.element[index], return_inverse=True, return_counts=True)
     position = views.field.atlas.position[element]
-    near = cKDTree(position).query(position, k=min(LEVELS.enough, len(element)))[1].reshape(len(element), -1)
+    neighbours = cKDTree(position).query(position, k=min(LEVELS.enough, len(element)))[1].reshape(len(element), -1)
 
     def summed(x: np.ndarray) -> np.ndarray:
         return np.bincount(group, x, len(element))
 
     def around(x: np.ndarray) -> np.ndarray:
-        return summed(x)[near].sum(1)
+        return summed(x)[neighbours].sum(1)
 
-    a, b = (x - (summed(x) / count)[group] for x in (seen, shown))
-    f0 = np.median((summed(seen - shown) / count)[near], 1)
-    own = around(a * a)
-    together = around(a * b) / np.sqrt(np.maximum(own * around(b * b), 1e-12))
-    off = around((seen - shown - f0[group]) ** 2)
-    return element, (off < own) & (together > MIRRORS.together) & (f0 > np.log(MIRRORS.least_f0))
+    a, b = (x - (summed(x) / count)[group] for x in (observed, predicted))
+    f0 = np.median((summed(observed - predicted) / count)[neighbours], 1)
+    variance = around(a * a)
+    correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
+    residual = around((observed - predicted - f0[group]) ** 2)
+    return element, (residual < variance) & (correlation > MIRRORS.together) & (f0 > np.log(MIRRORS.least_f0))

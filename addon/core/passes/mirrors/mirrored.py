@@ -1,4 +1,4 @@
-"""What frames saw of a mirror, against the room as a mirror that faces a tried way would show it."""
+"""What frames saw of a mirror, against the room as a mirror of a tried normal would show it."""
 
 from __future__ import annotations
 
@@ -47,29 +47,29 @@ class Views:
         return len(self.element)
 
     def part(self, index: np.ndarray) -> Views:
-        """Some of them."""
+        """The observations at `index`."""
         return Views(self.field, *(getattr(self, k)[index] for k in ("element", "origin", "direction", "radiance")))
 
     def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Which observations ((k,) int) a mirror that faces `normals` shows something known in, what ((k, 3)), and the
-        logarithm of what was seen and of what it shows, (k,) each."""
-        along = 2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
-        shown = self.field.along(self.origin, (along * normals - self.direction).astype(np.float32))[0]
-        known = np.flatnonzero(shown.mean(1) > DARK)
+        """Observations ((k,) int) whose mirrored direction is known under `normals`, the radiance from there ((k, 3)),
+        and the logarithms of the observed and of the predicted radiance, (k,) each."""
+        twice_cosine = (
+            2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
+        )
+        predicted = self.field.along(self.origin, (twice_cosine * normals - self.direction).astype(np.float32))[0]
+        known = np.flatnonzero(predicted.mean(1) > DARK)
         if len(known) < LEVELS.many:
             return None
-        seen, shown = self.radiance[known], shown[known]
-        return known, shown, *(np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
+        observed, predicted = self.radiance[known], predicted[known]
+        return known, predicted, *(np.log(np.maximum(x.mean(1), DARK)) for x in (observed, predicted))
 
-    def off(self, normal: np.ndarray) -> float:
-        """Mean absolute deviation of log radiance from a mirror that faces one way ((3,)); inf where too little is
-        known.
-        """
-        found = self.known(normal)
-        if found is None:
+    def deviation(self, normal: np.ndarray) -> float:
+        """Mean absolute deviation of log radiance from a mirror of one normal ((3,)); inf where too little is known."""
+        known = self.known(normal)
+        if known is None:
             return np.inf
-        ratio = found[2] - found[3]
-        # Beside an edge a ray of a slightly other way meets something else altogether.
+        ratio = known[2] - known[3]
+        # Beside an edge a ray of a slightly different direction meets another surface altogether.
         return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.stray).mean())
 
     def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
@@ -77,31 +77,31 @@ class Views:
 
         Returns
         -------
-        off, own : float
+        deviation, own_deviation : float
             Median absolute deviation of log radiance from the mirrored room, and from the elements' own means.
-        together : float
-            Correlation of what was seen with the mirrored room, within the elements.
+        correlation : float
+            Of what was seen with the mirrored room, within the elements.
         f0 : (3,) float
         """
-        found = self.known(normals)
-        if found is None:
+        result = self.known(normals)
+        if result is None:
             return np.inf, 0.0, 0.0, np.zeros(3)
-        known, shown, a, b = found
+        known, predicted, a, b = result
         _, group, count = np.unique(self.element[known], return_inverse=True, return_counts=True)
-        own_a, own_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
-        together = float(np.mean(own_a * own_b) / max(own_a.std() * own_b.std(), 1e-12))
-        off = float(np.median(np.abs(a - b - np.median(a - b))))
-        f0 = np.median(self.radiance[known] / np.maximum(shown, DARK), 0)
-        return off, float(np.median(np.abs(own_a))), together, f0
+        centred_a, centred_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
+        correlation = float(np.mean(centred_a * centred_b) / max(centred_a.std() * centred_b.std(), 1e-12))
+        deviation = float(np.median(np.abs(a - b - np.median(a - b))))
+        f0 = np.median(self.radiance[known] / np.maximum(predicted, DARK), 0)
+        return deviation, float(np.median(np.abs(centred_a))), correlation, f0
 
 
-def sides_of(normal: np.ndarray) -> np.ndarray:
+def tangents_of(normal: np.ndarray) -> np.ndarray:
     """Two unit vectors at right angles to a unit vector ((3,)) and to each other, (2, 3)."""
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     return np.stack([across, np.cross(normal, across)]) / np.linalg.norm(across)
 
 
-def turned(normal: np.ndarray, sides: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """A unit vector ((3,)) turned towards its `sides_of` by so many times its length ((2,)), (3,) float32."""
-    way = normal + by @ sides
-    return (way / np.linalg.norm(way)).astype(np.float32)
+def turned(normal: np.ndarray, tangents: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+    """A unit vector ((3,)) turned towards its `tangents_of` by multiples of its length ((2,)), (3,) float32."""
+    direction = normal + tilt @ tangents
+    return (direction / np.linalg.norm(direction)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What it takes to believe in a flat mirror; what it gains: docs/ablation.md."""
+"""When an object is taken for a flat mirror; what it gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class MirrorsParams:
         A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
     tells : float
         Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark
-        hearth shows tells nothing of its way: it was turned by a degree to take a hundredth off.
+        hearth shows tells nothing of its normal: it was turned by a degree to take a hundredth off.
     stray : float
         Deviation of log radiance from which on more counts no more: a ray beside an edge meets something else.
     tilt, tilts : float, int

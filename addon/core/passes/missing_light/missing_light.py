@@ -80,8 +80,8 @@ def find_missing_light(
     """
     atlas, windows = field.atlas, np.zeros(CELLS, bool) if windows is None else windows
     radiance = evened(field)
-    own = {one: atlas.object_id == one for one in patches}
-    bound = {one: np.median(radiance[which], 0).astype(np.float64) for one, which in own.items()}
+    masks = {patch: atlas.object_id == patch for patch in patches}
+    bound = {patch: np.median(radiance[mask], 0).astype(np.float64) for patch, mask in masks.items()}
     shut = unseen_closing(field)
     hidden = np.isin(atlas.object_id, patches) | shut
     element = _sample(field, good & ~hidden, seed)
@@ -89,44 +89,48 @@ def find_missing_light(
     received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
     sky = field.environment
     part = sky.clipped_parts(MISSING.sky)
-    cell, through, shown, by_part = _through_cells(field, part, shut, windows, element, seed)
-    received = received + shown
-    thrown = contributions(field, element, [[one] for one in patches], seed)
-    same = same_lamps(atlas, list(own.values()))
-    usual = _daylight(np.median(radiance[element], 0).astype(np.float64))
+    cell, through, from_sky, by_part = _through_cells(field, part, shut, windows, element, seed)
+    received = received + from_sky
+    by_patch = contributions(field, element, [[patch] for patch in patches], seed)
+    lamp_of = same_lamps(atlas, list(masks.values()))
+    daylight = _daylight(np.median(radiance[element], 0).astype(np.float64))
     # What hardly any element sees says nothing, and lights nothing.
-    told, lit = (given.mean(0) >= MISSING.least_seen for given in (through, by_part))
-    level = sky.mean_of(part, len(lit))
-    received = received + through[:, ~told].sum(1)[:, None] * usual + by_part[:, ~lit] @ level[~lit]
-    told_by = np.reshape(list(bound.values()), (-1, 3))
-    least = np.reshape([np.median(told_by[w > 0] / w[w > 0, None], 0) for w in same.T], (-1, 3))
-    clipped, cells = np.concatenate([least, level[lit]]), int(told.sum())
+    usable_cells, usable_parts = (contribution.mean(0) >= MISSING.least_seen for contribution in (through, by_part))
+    level = sky.mean_of(part, len(usable_parts))
+    received = (
+        received
+        + through[:, ~usable_cells].sum(1)[:, None] * daylight
+        + by_part[:, ~usable_parts] @ level[~usable_parts]
+    )
+    bounds = np.reshape(list(bound.values()), (-1, 3))
+    patch_bounds = np.reshape([np.median(bounds[w > 0] / w[w > 0, None], 0) for w in lamp_of.T], (-1, 3))
+    lower_bounds, cells = np.concatenate([patch_bounds, level[usable_parts]]), int(usable_cells.sum())
     unknown = Unknown(
-        np.concatenate([thrown @ same, by_part[:, lit], through[:, told]], 1),
-        np.concatenate([clipped, np.full((cells, 3), 1e-6)]),
-        np.concatenate([least, _daylight(level[lit]), np.tile(usual, (cells, 1))]),
+        np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1),
+        np.concatenate([lower_bounds, np.full((cells, 3), 1e-6)]),
+        np.concatenate([patch_bounds, _daylight(level[usable_parts]), np.tile(daylight, (cells, 1))]),
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
-    found, spread = solve(sent, received, unknown, pairs)
+    radiances, spread = solve(sent, received, unknown, pairs)
 
-    of_patch = same @ found[: len(least)]
-    solved = dict(zip(patches, of_patch, strict=True))
-    E = received + unknown.contribution @ found
-    of_all = thrown * (of_patch @ LUMINANCE) / (E @ LUMINANCE)[:, None]
-    sunlit = {one for one, which in own.items() if _mostly_lit(field, which)}
-    strong = (of_all > LEVELS.gain).sum(0) >= LEVELS.many
+    patch_radiance = lamp_of @ radiances[: len(patch_bounds)]
+    solved = dict(zip(patches, patch_radiance, strict=True))
+    E = received + unknown.contribution @ radiances
+    patch_shares = by_patch * (patch_radiance @ LUMINANCE) / (E @ LUMINANCE)[:, None]
+    sunlit = {patch for patch, mask in masks.items() if _mostly_lit(field, mask)}
+    strong = (patch_shares > LEVELS.gain).sum(0) >= LEVELS.many
     lamps = tuple(
-        Lamp(one, solved[one].astype(np.float32), False, clipped=True, spread=spread)
-        for k, one in enumerate(patches)
-        if strong[k] and (solved[one] > MISSING.lamp * bound[one]).all() and one not in sunlit
+        Lamp(patch, solved[patch].astype(np.float32), False, clipped=True, spread=spread)
+        for k, patch in enumerate(patches)
+        if strong[k] and (solved[patch] > MISSING.lamp * bound[patch]).all() and patch not in sunlit
     )
-    by_opening = np.tile(usual, (len(through.T), 1))
-    by_opening[told] = found[len(clipped) :]
-    level[lit] = found[len(least) : len(clipped)]
+    opening_radiance = np.tile(daylight, (len(through.T), 1))
+    opening_radiance[usable_cells] = radiances[len(lower_bounds) :]
+    level[usable_parts] = radiances[len(patch_bounds) : len(lower_bounds)]
     low, size = field.outer_box
-    share = float((unknown.contribution[:, len(least) :] @ found[len(least) :]).sum() / E.sum())
-    openings = Openings(low, size, by_opening[cell].astype(np.float32), share, windows)
+    share = float((unknown.contribution[:, len(patch_bounds) :] @ radiances[len(patch_bounds) :]).sum() / E.sum())
+    openings = Openings(low, size, opening_radiance[cell].astype(np.float32), share, windows)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
         "what no frame saw there may be a lamp."
@@ -141,13 +145,13 @@ def _daylight(radiance: np.ndarray) -> np.ndarray:
     return np.repeat((radiance @ LUMINANCE)[..., None], 3, -1)
 
 
-def _mostly_lit(field: LightField, which: np.ndarray) -> bool:
+def _mostly_lit(field: LightField, mask: np.ndarray) -> bool:
     """Whether the sun lights most of some elements, (n,) bool."""
-    return 2 * from_sun(field, np.flatnonzero(which)).any(1).sum() > which.sum()
+    return 2 * from_sun(field, np.flatnonzero(mask)).any(1).sum() > mask.sum()
 
 
 def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
-    """Which patches are the same lamp, hung several times in one plane, of about one area: it gives as much light each.
+    """Which patches are the same lamp, hung several times in one plane with about one area: each has the same radiance.
 
     Parameters
     ----------
@@ -159,22 +163,23 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
     (p, l) float
         Radiance of each patch where each of l lamps is of the mean radiance 1; 0 for what is another.
     """
-    area = np.maximum([atlas.area[own].sum() for own in patches], 1e-12)
+    area = np.maximum([atlas.area[mask].sum() for mask in patches], 1e-12)
     centre, normal = (
-        np.reshape([atlas.area[own] @ of[own] for own in patches], (-1, 3)) for of in (atlas.position, atlas.normal)
+        np.reshape([atlas.area[mask] @ values[mask] for mask in patches], (-1, 3))
+        for values in (atlas.position, atlas.normal)
     )
     centre = centre / area[:, None]
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    left, lamps = np.ones(len(patches), bool), []
-    for one in np.argsort(-area, kind="stable"):
-        if left[one]:
+    free, lamps = np.ones(len(patches), bool), []
+    for i in np.argsort(-area, kind="stable"):
+        if free[i]:
             # Normals of small patches are off by degrees, which is decimetres across a room: one of the two has to do.
-            away = centre - centre[one]
-            height = np.minimum(np.abs(away @ normal[one]), np.abs(np.einsum("ij,ij->i", away, normal)))
+            offset = centre - centre[i]
+            height = np.minimum(np.abs(offset @ normal[i]), np.abs(np.einsum("ij,ij->i", offset, normal)))
             flat = height < COPLANAR.off
-            alike = left & flat & (normal @ normal[one] > np.cos(COPLANAR.turn)) & (MISSING.alike * area > area[one])
-            alike[one] = True
-            left[alike] = False
+            alike = free & flat & (normal @ normal[i] > np.cos(COPLANAR.turn)) & (MISSING.alike * area > area[i])
+            alike[i] = True
+            free[alike] = False
             lamps.append(np.where(alike, area[alike].mean() / area, 0))
     return np.reshape(lamps, (len(lamps), len(patches))).T
 
@@ -205,8 +210,8 @@ def _through_cells(
         That each cell belongs to.
     through : (m, u) float64
         E from each of those at radiance 1.
-    shown : (m, 3) float64
-        E from where frames tell the sky.
+    from_sky : (m, 3) float64
+        E from the sky that frames tell.
     by_part : (m, p) float64
         E from each clipped `part` ((h, 2h) int) at radiance 1.
     """
@@ -218,29 +223,29 @@ def _through_cells(
     unfamiliar = sky.unfamiliar if sky.seen else np.ones(sky.observations.shape, np.float32)
     patterns = cosine_patterns(MISSING.rays, seed)
     through = np.zeros((len(element), int(unknown.max()) + 1))
-    shown, by_part = np.zeros((len(element), 3)), np.zeros((len(element), int(part.max()) + 1))
+    from_sky, by_part = np.zeros((len(element), 3)), np.zeros((len(element), int(part.max()) + 1))
 
     def run(block: slice) -> None:
         normal = field.atlas.normal[element[block]]
         directions = turned(patterns, normal, np.random.default_rng([seed, block.start]))[0].reshape(-1, 3)
         origins = np.repeat(field.scene.off_surface(field.atlas.position[element[block]], normal), MISSING.rays, 0)
-        hits, each = field.scene.intersect(origins, directions), np.full(len(origins), np.pi / MISSING.rays)
-        met, closed = hits.triangle, shut[field.elements(hits)]
-        if field.mirrors and len(seen := np.flatnonzero((met >= 0) & (field.mirror_of.take(met) >= 0))):
-            origins[seen], directions[seen], f0 = field.onward(hits.part(seen), directions[seen])
-            further = field.scene.intersect(origins[seen], directions[seen])
-            met[seen], closed[seen] = further.triangle, shut[field.elements(further)]
-            each[seen] *= f0.mean(1)
-        closed &= met >= 0
-        out = np.flatnonzero((met < 0) | closed)
-        place, way, each = out // MISSING.rays, directions[out], each[out]
-        by = exits(low, size, origins[out], way)[0]
-        share = np.where(closed[out], 1, np.where(windows[by], 0, sky.at(unfamiliar, way))) * each
-        np.add.at(through[block], (place, unknown[by]), share)
-        rest, own = each - share, sky.at(part, way)
-        clipped = own >= 0
-        np.add.at(by_part[block], (place[clipped], own[clipped]), rest[clipped])
-        np.add.at(shown[block], place[~clipped], rest[~clipped, None] * sky(way[~clipped]))
+        hits, weight = field.scene.intersect(origins, directions), np.full(len(origins), np.pi / MISSING.rays)
+        triangle, closed = hits.triangle, shut[field.elements(hits)]
+        if field.mirrors and len(mirrored := np.flatnonzero((triangle >= 0) & (field.mirror_of.take(triangle) >= 0))):
+            origins[mirrored], directions[mirrored], f0 = field.onward(hits.part(mirrored), directions[mirrored])
+            further = field.scene.intersect(origins[mirrored], directions[mirrored])
+            triangle[mirrored], closed[mirrored] = further.triangle, shut[field.elements(further)]
+            weight[mirrored] *= f0.mean(1)
+        closed &= triangle >= 0
+        escaped = np.flatnonzero((triangle < 0) | closed)
+        receiver, direction, weight = escaped // MISSING.rays, directions[escaped], weight[escaped]
+        exit_cell = exits(low, size, origins[escaped], direction)[0]
+        share = np.where(closed[escaped], 1, np.where(windows[exit_cell], 0, sky.at(unfamiliar, direction))) * weight
+        np.add.at(through[block], (receiver, unknown[exit_cell]), share)
+        sky_weight, sky_part = weight - share, sky.at(part, direction)
+        clipped = sky_part >= 0
+        np.add.at(by_part[block], (receiver[clipped], sky_part[clipped]), sky_weight[clipped])
+        np.add.at(from_sky[block], receiver[~clipped], sky_weight[~clipped, None] * sky(direction[~clipped]))
 
     for_blocks(run, len(element), 64, 0)
-    return unknown, through, shown, by_part
+    return unknown, through, from_sky, by_part

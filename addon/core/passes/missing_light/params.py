@@ -1,4 +1,4 @@
-"""What is believed of light that a scan without objects lacks; what it gains: docs/ablation.md."""
+"""Parameters of the light that a scan without objects lacks; what it gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

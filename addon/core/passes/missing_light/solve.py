@@ -23,14 +23,14 @@ def in_one_plane(position: np.ndarray, normal: np.ndarray, seed: int) -> np.ndar
     """Pairs of m elements that lie in one plane, the nearest and some of all, (p, 2) int."""
     m = len(position)
     key = np.concatenate([position, 3 * normal], 1)
-    near = cKDTree(key).query(key, min(LEVELS.neighbours + 1, m))[1]
-    pairs = [np.stack([np.repeat(np.arange(m), near.shape[1] - 1), near[:, 1:].ravel()], 1)]
+    neighbours = cKDTree(key).query(key, min(LEVELS.neighbours + 1, m))[1]
+    pairs = [np.stack([np.repeat(np.arange(m), neighbours.shape[1] - 1), neighbours[:, 1:].ravel()], 1)]
     rng = np.random.default_rng(seed)
-    some = rng.integers(0, m, (8 * LEVELS.neighbours * m, 2))
-    a, b = some.T
+    drawn = rng.integers(0, m, (8 * LEVELS.neighbours * m, 2))
+    a, b = drawn.T
     alike = np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(COPLANAR.turn)
-    off = np.abs(np.einsum("ij,ij->i", position[a] - position[b], normal[a]))
-    pairs.append(some[alike & (off < COPLANAR.off) & (a != b)][: LEVELS.neighbours * m])
+    distance = np.abs(np.einsum("ij,ij->i", position[a] - position[b], normal[a]))
+    pairs.append(drawn[alike & (distance < COPLANAR.off) & (a != b)][: LEVELS.neighbours * m])
     return np.concatenate(pairs)
 
 
@@ -42,18 +42,18 @@ class Unknown:
     ----------
     contribution : (m, k) float64
         E from each at radiance 1.
-    least : (k, 3) float64
+    lower : (k, 3) float64
         Lower bounds of their radiances.
-    usual : (k, 3) float64
-        What they show if they are no lamps.
+    expected : (k, 3) float64
+        Radiances if they are no lamps.
     """
 
     contribution: np.ndarray
-    least: np.ndarray
-    usual: np.ndarray
+    lower: np.ndarray
+    expected: np.ndarray
 
 
-class _Plausible:
+class _NegativeLogPosterior:
     """Minus the log posterior, and its gradient, of the log radiances."""
 
     def __init__(self, sent: np.ndarray, received: np.ndarray, unknown: Unknown, pairs: np.ndarray):
@@ -61,9 +61,9 @@ class _Plausible:
         self._received, self._G = received, unknown.contribution
         p, m = len(pairs), len(sent)
         ends = np.stack([np.ones(p), -np.ones(p)], 1).ravel()
-        self._differ = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
-        self._back = self._differ.T.tocsr()
-        self.usual = np.log(np.maximum(unknown.usual, 1e-6))
+        self._difference = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
+        self._difference_transposed = self._difference.T.tocsr()
+        self.expected = np.log(np.maximum(unknown.expected, 1e-6))
 
     def log_albedo(self, x: np.ndarray) -> np.ndarray:
         """(m, 3) at log radiances `x` ((k, 3))."""
@@ -75,21 +75,23 @@ class _Plausible:
         radiance = np.exp(x)
         E = self._received + self._G @ radiance
         a = self._sent - np.log(E)
-        apart = self._differ @ a / MISSING.apart
-        value = 0.5 * float(np.log1p(apart**2).sum()) / max(len(apart), 1)
-        by_a = self._back @ (apart / (1 + apart**2)) / (MISSING.apart * max(len(apart), 1))
-        off = (a.mean(1) - np.log(USUAL_ALBEDO)) / MISSING.deviation
-        value += MISSING.level * 0.5 * float((off**2).mean())
-        by_a += (MISSING.level / (MISSING.deviation * channels * m) * off)[:, None]
+        difference = self._difference @ a / MISSING.apart
+        value = 0.5 * float(np.log1p(difference**2).sum()) / max(len(difference), 1)
+        grad_a = (
+            self._difference_transposed @ (difference / (1 + difference**2)) / (MISSING.apart * max(len(difference), 1))
+        )
+        offset = (a.mean(1) - np.log(USUAL_ALBEDO)) / MISSING.deviation
+        value += MISSING.level * 0.5 * float((offset**2).mean())
+        grad_a += (MISSING.level / (MISSING.deviation * channels * m) * offset)[:, None]
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
-        above = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
-        far = np.sqrt(1 + (above / LEVELS.sigmas) ** 2)
-        value += LEVELS.sigmas**2 * float((far - 1).mean())
-        by_a += above / far / (0.1 * channels * m)
-        gradient = -(self._G.T @ (by_a / E)) * radiance
-        odd = x - self.usual
-        level = odd.mean(1, keepdims=True) / MISSING.unlike
-        tint = (odd - odd.mean(1, keepdims=True)) / MISSING.tint
+        excess = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
+        root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)
+        value += LEVELS.sigmas**2 * float((root - 1).mean())
+        grad_a += excess / root / (0.1 * channels * m)
+        gradient = -(self._G.T @ (grad_a / E)) * radiance
+        deviation = x - self.expected
+        level = deviation.mean(1, keepdims=True) / MISSING.unlike
+        tint = (deviation - deviation.mean(1, keepdims=True)) / MISSING.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         weight = MISSING.sources * channels / k
         value += weight * float(np.log1p(level**2).sum() + np.log(coloured).sum())
@@ -115,20 +117,20 @@ def solve(
     -------
     radiance : (k, 3) float64
     spread : (2,) tuple of float
-        Mean deviation of log albedo between pairs under the least radiances, and now.
+        Mean deviation of log albedo between pairs under the expected radiances, and under these.
     """
-    cost = _Plausible(sent, received, unknown, pairs)
-    low = np.log(np.maximum(unknown.least, 1e-6))
-    start = cost.usual + np.log(MISSING.start)
-    found = low  # of a closed mesh without clipped patches nothing is unknown
+    cost = _NegativeLogPosterior(sent, received, unknown, pairs)
+    low = np.log(np.maximum(unknown.lower, 1e-6))
+    start = cost.expected + np.log(MISSING.start)
+    log_radiance = low  # of a closed mesh without clipped patches nothing is unknown
     if low.size:
-        found = minimize(
+        log_radiance = minimize(
             cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
-            bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": LEVELS.steps},
+            bounds=[(bound, 12.0) for bound in low.ravel()], options={"maxiter": LEVELS.steps},
         ).x.reshape(low.shape)  # fmt: skip
 
     def spread(x: np.ndarray) -> float:
         a = cost.log_albedo(x).mean(1)
         return float(np.median(np.abs(a[pairs[:, 0]] - a[pairs[:, 1]])))
 
-    return np.exp(found), (spread(cost.usual), spread(found))
+    return np.exp(log_radiance), (spread(cost.expected), spread(log_radiance))

@@ -1,4 +1,4 @@
-"""What it takes to believe in a sun that no frame sees; what it gains: docs/ablation.md."""
+"""When a sun that no frame sees is believed in; what it gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

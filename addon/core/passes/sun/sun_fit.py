@@ -41,47 +41,49 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     """Directions of the grid that may be the sun's, the best first."""
     value = even.log_albedo()
     excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
-    out = np.flatnonzero(even.stands_out())
-    way = reaching_most(even, out, np.clip(excess[out], 0, 3), environment)
-    guesses = list(ordered_map(even.explained, way, 0))
+    outliers = np.flatnonzero(even.stands_out())
+    directions = reaching_most(even, outliers, np.clip(excess[outliers], 0, 3), environment)
+    guesses = list(ordered_map(even.explained, directions, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
-    refined = ordered_map(lambda one: searched(even.explained, one, SHARP[:2]), apart(guesses)[: SUN.refined], 0)
-    return apart(list(refined))[: SUN.tried]
+    refined = ordered_map(
+        lambda guess: pattern_search(even.explained, guess, SHARP[:2]), distinct(guesses)[: SUN.refined], 0
+    )
+    return distinct(list(refined))[: SUN.tried]
 
 
-def reaching_most(spots: Spots, some: np.ndarray, weight: np.ndarray, environment: Environment) -> np.ndarray:
-    """Directions of the grid that reach most of some spots ((k,) int), which weigh (k,): (d, 3) float32.
+def reaching_most(spots: Spots, index: np.ndarray, weight: np.ndarray, environment: Environment) -> np.ndarray:
+    """Directions of the grid that reach most of the spots at `index` ((k,) int), which weigh (k,): (d, 3) float32.
 
     Of those above the horizon from which frames don't tell what comes.
     """
-    way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    way = way[(way[:, 2] > 0) & ~environment.known(way)]
-    spot, ray = np.nonzero(spots.normal[some] @ way.T > 0)
-    start = spots.scene.off_surface(spots.position[some], spots.normal[some])
-    hidden = spots.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
-    reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
+    directions = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
+    directions = directions[(directions[:, 2] > 0) & ~environment.known(directions)]
+    spot, ray = np.nonzero(spots.normal[index] @ directions.T > 0)
+    origin = spots.scene.off_surface(spots.position[index], spots.normal[index])
+    occluded = spots.scene.occluded(origin[spot], directions[ray], np.full(len(spot), np.inf, np.float32))
+    reached = np.bincount(ray[~occluded], weight[spot[~occluded]], len(directions)) / max(weight.sum(), 1e-9)
     best = np.argsort(-reached, kind="stable")[: SUN.kept]
-    return way[best[reached[best] > SUN.reached]]
+    return directions[best[reached[best] > SUN.reached]]
 
 
-def apart(guesses: list[Guess]) -> list[Guess]:
+def distinct(guesses: list[Guess]) -> list[Guess]:
     """The guesses that have none better within 1.5 `GRID`, the best first."""
     chosen: list[Guess] = []
-    for guess in sorted(guesses, key=lambda one: one.cost):
-        if all(guess.direction @ one.direction < np.cos(1.5 * GRID) for one in chosen):
+    for guess in sorted(guesses, key=lambda guess: guess.cost):
+        if all(guess.direction @ better.direction < np.cos(1.5 * GRID) for better in chosen):
             chosen.append(guess)
     return chosen
 
 
-def searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
+def pattern_search(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
     """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps.
 
     It stays above the horizon.
     """
     for step in steps:
         for _ in range(4):
-            ways = (way for way in around(guess.direction, step * _ring(8)) if way[2] > 0)
-            new = min(map(cost, ways), key=lambda one: one.cost, default=guess)
+            directions = (direction for direction in around(guess.direction, step * _ring(8)) if direction[2] > 0)
+            new = min(map(cost, directions), key=lambda candidate: candidate.cost, default=guess)
             if new.cost >= guess.cost:
                 break
             guess = new
@@ -90,24 +92,24 @@ def searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarra
 
 def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Elements of the pool that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
-    ways = around(direction, ASTRAY * np.concatenate([np.zeros((1, 2)), _ring(8), _ring(4) / 2]))
+    directions = around(direction, ASTRAY * np.concatenate([np.zeros((1, 2)), _ring(8), _ring(4) / 2]))
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
-    lit = np.stack([visible(field.scene, way, position, normal) > 0.1 for way in ways])
+    lit = np.stack([visible(field.scene, sun, position, normal) > 0.1 for sun in directions])
     mixed = pool[lit.any(0) & ~lit.all(0)]
     return np.sort(rng.choice(mixed, min(len(mixed), SUN.dense), replace=False))
 
 
 def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Elements of the objects on which something stands out ((k,)), and whether they lie `near` that ((k,) bool)."""
-    atlas, out = field.atlas, even.stands_out()
-    pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[out]))
+    atlas, outliers = field.atlas, even.stands_out()
+    pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[outliers]))
     pool = np.sort(rng.choice(pool, min(len(pool), SAMPLES.in_all), replace=False))
 
     def key(element: np.ndarray) -> np.ndarray:
         return np.concatenate([atlas.position[element], 100.0 * atlas.object_id[element][:, None]], 1)
 
-    far, _ = cKDTree(key(even.sample.element[out])).query(key(pool), distance_upper_bound=SUN.near)
-    return pool, np.isfinite(far)
+    distance, _ = cKDTree(key(even.sample.element[outliers])).query(key(pool), distance_upper_bound=SUN.near)
+    return pool, np.isfinite(distance)
 
 
 @dataclass(frozen=True)
@@ -175,37 +177,37 @@ def find_sun(
               for part, count in ((pool[near], SUN.dense * 2 // 3), (pool[~near], SUN.dense // 3))]  # fmt: skip
     dense = np.sort(np.concatenate(chosen))
     spots = Spots(field, dense, irradiance(dense))
-    starts = (spots.explained(one.direction) for one in guesses)
-    tried = ordered_map(lambda one: searched(spots.explained, one, SHARP), starts, 0)
-    best, before = min(tried, key=lambda one: one.cost), spots.spread()
+    starts = (spots.explained(guess.direction) for guess in guesses)
+    tried = ordered_map(lambda guess: pattern_search(spots.explained, guess, SHARP), starts, 0)
+    best, before = min(tried, key=lambda guess: guess.cost), spots.spread()
     if best.cost > (1 - LEVELS.gain) * before:
         return None
-    along = along_edges(field, pool, best.direction, rng)
-    if len(along) < LEVELS.few:
+    edge_elements = along_edges(field, pool, best.direction, rng)
+    if len(edge_elements) < LEVELS.few:
         return None
-    edges = Edges(Spots(field, along, irradiance(along)))
-    found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
+    edges = Edges(Spots(field, edge_elements, irradiance(edge_elements)))
+    fit = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda guess: guess.cost)
     for steps in (SOFT, SOFT[1:]):
 
-        def cost(way: np.ndarray, now: Guess = found) -> Guess:
-            return edges.explained(way, now.strength, now.radius)
+        def cost(direction: np.ndarray, current: Guess = fit) -> Guess:
+            return edges.explained(direction, current.strength, current.radius)
 
-        found = searched(cost, found, steps)
-        contribution = spots.contribution(found.direction, found.radius)
+        fit = pattern_search(cost, fit, steps)
+        contribution = spots.contribution(fit.direction, fit.radius)
         strength = spots.strength(contribution)
-        found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
-    contribution = spots.contribution(found.direction, found.radius)
-    after = spots.spread(contribution, found.strength)
+        fit = min((edges.explained(fit.direction, strength, r) for r in RADII), key=lambda guess: guess.cost)
+    contribution = spots.contribution(fit.direction, fit.radius)
+    after = spots.spread(contribution, fit.strength)
     short = spots.over() & (contribution > 0)
-    left = short & spots.over(contribution, found.strength)
+    still_over = short & spots.over(contribution, fit.strength)
     if (
-        found.cost > (1 - LEVELS.gain) * edges.differ()
+        fit.cost > (1 - LEVELS.gain) * edges.differ()
         or after > (1 - LEVELS.gain) * before
-        or 2 * left.sum() > short.sum()
-        or not _of_a_sun(spots, contribution)
+        or 2 * still_over.sum() > short.sum()
+        or not _is_sunlike(spots, contribution)
     ):
         return None
-    return SolvedSun(_coloured(spots, found.direction, found.radius, before, after), spots, before, after)
+    return SolvedSun(_coloured(spots, fit.direction, fit.radius, before, after), spots, before, after)
 
 
 def _channels(spots: Spots, contribution: np.ndarray) -> np.ndarray:
@@ -213,7 +215,7 @@ def _channels(spots: Spots, contribution: np.ndarray) -> np.ndarray:
     return np.array([spots.strength(contribution, weights) for weights in (*np.eye(3), LUMINANCE)])
 
 
-def _of_a_sun(spots: Spots, contribution: np.ndarray) -> bool:
+def _is_sunlike(spots: Spots, contribution: np.ndarray) -> bool:
     """Whether no channel is brighter than a sun's can be: in what copper shades throw onto a table red is.
 
     A channel that is too dark says nothing, as errors of the other light weigh most in it: a bedroom's true sun had .63
@@ -223,11 +225,11 @@ def _of_a_sun(spots: Spots, contribution: np.ndarray) -> bool:
     return bool((np.array(channels) <= luminance * SUN.colour).all())
 
 
-def of_luminance(told: np.ndarray) -> np.ndarray:
+def of_luminance(strengths: np.ndarray) -> np.ndarray:
     """A sun's irradiance ((3,) float32) by what each channel says of it, held near the luminance, which comes last."""
-    *channels, luminance = told
-    held = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
-    return (held * (luminance / max(float(held @ LUMINANCE), 1e-12))).astype(np.float32)
+    *channels, luminance = strengths
+    limited = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
+    return (limited * (luminance / max(float(limited @ LUMINANCE), 1e-12))).astype(np.float32)
 
 
 def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:

@@ -22,7 +22,7 @@ from ...scene.lit_diffuse import LitDiffuse
 from ...scene.params import SAMPLES
 from ...significance import LEVELS
 from .params import SUN
-from .sun_fit import RADII, SHARP, along_edges, apart, of_luminance, reaching_most, searched
+from .sun_fit import RADII, SHARP, along_edges, distinct, of_luminance, pattern_search, reaching_most
 from .sun_spots import Guess, Spots
 
 
@@ -45,47 +45,49 @@ def find_patch_sun(
 
     element = spread_over(dark, seen, SUN.even, rng)
     spots = Spots(dark, element, irradiance_at(lit, element, seed))
-    out = spots.over() | spots.stands_out() & ~np.isin(spots.sample.object_id, patches)
-    direction = direction_of(spots, out, dark.environment)
+    outliers = spots.over() | spots.stands_out() & ~np.isin(spots.sample.object_id, patches)
+    direction = direction_of(spots, outliers, dark.environment)
     if direction is None:
         return None
-    lies = np.unique(spots.sample.object_id[spots.contribution(direction) > 0])
-    pool = spread_over(dark, seen[np.isin(dark.atlas.object_id[seen], lies)], SAMPLES.in_all, rng)
-    along = along_edges(dark, pool, direction, rng)
-    told = np.zeros(4)
-    if len(along):
-        told = strength_of(
-            Spots(dark, along, irradiance_at(lit, along, seed)), direction, lit_diffuse.clipped[along] > 0.5
+    lit_objects = np.unique(spots.sample.object_id[spots.contribution(direction) > 0])
+    pool = spread_over(dark, seen[np.isin(dark.atlas.object_id[seen], lit_objects)], SAMPLES.in_all, rng)
+    edge_elements = along_edges(dark, pool, direction, rng)
+    strengths = np.zeros(4)
+    if len(edge_elements):
+        strengths = strength_of(
+            Spots(dark, edge_elements, irradiance_at(lit, edge_elements, seed)),
+            direction,
+            lit_diffuse.clipped[edge_elements] > 0.5,
         )
-    if not (told > 0).all():
+    if not (strengths > 0).all():
         return None
-    sun = Sun(direction, of_luminance(told))
+    sun = Sun(direction, of_luminance(strengths))
     return replace(
         sun, note=f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()}."
     )
 
 
-def direction_of(spots: Spots, out: np.ndarray, sky: Environment) -> np.ndarray | None:
-    """Unit vector towards a sun that lights mainly what stands `out` ((m,) bool), (3,) float32; None without one.
+def direction_of(spots: Spots, outliers: np.ndarray, sky: Environment) -> np.ndarray | None:
+    """Unit vector towards a sun that lights mainly the `outliers` ((m,) bool), (3,) float32; None without one.
 
     It stands where frames don't tell the `sky`.
     """
-    if out.sum() < LEVELS.enough:
+    if outliers.sum() < LEVELS.enough:
         return None
 
-    def told(direction: np.ndarray) -> Guess:
-        return Guess(direction, -_ratio(out, spots.contribution(direction) > 0))
+    def guess_of(direction: np.ndarray) -> Guess:
+        return Guess(direction, -_log_likelihood_ratio(outliers, spots.contribution(direction) > 0))
 
-    some = np.flatnonzero(out)
-    some = some[:: -(-len(some) // LEVELS.of_object)]
-    way = reaching_most(spots, some, np.ones(len(some)), sky)
-    guesses = apart(list(ordered_map(told, way, 0)))[: SUN.tried]
-    refined = ordered_map(lambda one: searched(told, one, SHARP), guesses, 0)
-    best = min(refined, key=lambda one: one.cost, default=None)
+    sample = np.flatnonzero(outliers)
+    sample = sample[:: -(-len(sample) // LEVELS.of_object)]
+    directions = reaching_most(spots, sample, np.ones(len(sample)), sky)
+    guesses = distinct(list(ordered_map(guess_of, directions, 0)))[: SUN.tried]
+    refined = ordered_map(lambda guess: pattern_search(guess_of, guess, SHARP), guesses, 0)
+    best = min(refined, key=lambda guess: guess.cost, default=None)
     if best is None:
         return None
     lit = spots.contribution(best.direction) > 0
-    return best.direction if lit.sum() >= LEVELS.enough and 2 * (out & lit).sum() > lit.sum() else None
+    return best.direction if lit.sum() >= LEVELS.enough and 2 * (outliers & lit).sum() > lit.sum() else None
 
 
 def strength_of(spots: Spots, direction: np.ndarray, clipped: np.ndarray) -> np.ndarray:
@@ -104,23 +106,25 @@ def strength_of(spots: Spots, direction: np.ndarray, clipped: np.ndarray) -> np.
     if not len(lit) or not len(shade):
         return np.zeros(4)
     key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-    far, nearest = cKDTree(key[shade]).query(key[lit], distance_upper_bound=SUN.near)
-    a, b = lit[np.isfinite(far)], shade[nearest[np.isfinite(far)]]
+    distance, nearest = cKDTree(key[shade]).query(key[lit], distance_upper_bound=SUN.near)
+    a, b = lit[np.isfinite(distance)], shade[nearest[np.isfinite(distance)]]
     if len(a) < LEVELS.enough or clipped[a].all():
         return np.zeros(4)
-    found = []
+    strengths = []
     for weights in (*np.eye(3), LUMINANCE):
         value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
         needed = received[a] * (np.exp(value[a] - value[b]) - 1) / contribution[a]
-        left = ecdf(CensoredData.right_censored(needed, clipped[a])).sf
-        half = np.flatnonzero(left.probabilities <= 0.5)
-        found.append(left.quantiles[half[0]] if len(half) else needed[~clipped[a]].max())
-    return np.array(found)
+        survival = ecdf(CensoredData.right_censored(needed, clipped[a])).sf
+        half = np.flatnonzero(survival.probabilities <= 0.5)
+        strengths.append(survival.quantiles[half[0]] if len(half) else needed[~clipped[a]].max())
+    return np.array(strengths)
 
 
-def _ratio(out: np.ndarray, lit: np.ndarray) -> float:
-    """Log likelihood that what is `lit` stands `out` more often than the rest, over that of one share; 0 if less."""
-    table = np.array([[(out & lit).sum(), (~out & lit).sum()], [(out & ~lit).sum(), (~out & ~lit).sum()]], float)
+def _log_likelihood_ratio(outliers: np.ndarray, lit: np.ndarray) -> float:
+    """Log likelihood that what is `lit` has more `outliers` than the rest, over that of one share; 0 if fewer."""
+    table = np.array(
+        [[(outliers & lit).sum(), (~outliers & lit).sum()], [(outliers & ~lit).sum(), (~outliers & ~lit).sum()]], float
+    )
     if table[0, 0] * table[1, 1] <= table[0, 1] * table[1, 0]:
         return 0.0
     expected = table.sum(1, keepdims=True) * table.sum(0) / table.sum()

@@ -18,9 +18,9 @@ def visible(scene: RayScene, direction: np.ndarray, position: np.ndarray, normal
     """Cosine of a direction where nothing hides it, else 0, (n,) float32."""
     cosine = np.maximum(normal @ np.asarray(direction, np.float32), 0)
     facing = np.flatnonzero(cosine > 0)
-    way = np.broadcast_to(np.float32(direction), (len(facing), 3))
-    start = scene.off_surface(position[facing], normal[facing])
-    cosine[facing[scene.occluded(start, way, np.full(len(facing), np.inf, np.float32))]] = 0
+    directions = np.broadcast_to(np.float32(direction), (len(facing), 3))
+    origins = scene.off_surface(position[facing], normal[facing])
+    cosine[facing[scene.occluded(origins, directions, np.full(len(facing), np.inf, np.float32))]] = 0
     return cosine
 
 
@@ -91,10 +91,10 @@ class Spots:
         group = self.sample.group
         order = np.flatnonzero(chosen)[np.lexsort((values[chosen], group[chosen]))]
         count = np.bincount(group[chosen], minlength=int(group.max(initial=0)) + 1)
-        found = np.full(len(count), np.nan)
+        median = np.full(len(count), np.nan)
         start = np.concatenate([[0], np.cumsum(count)[:-1]])
-        found[count > 0] = values[order[(start + count // 2)[count > 0]]]
-        return found[group]
+        median[count > 0] = values[order[(start + count // 2)[count > 0]]]
+        return median[group]
 
     def strength(self, contribution: np.ndarray, weights=LUMINANCE) -> float:
         """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
@@ -122,9 +122,9 @@ class Edges:
     def __init__(self, spots: Spots):
         self.spots = spots
         key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=LESS_NOISE.cell)
-        self.a, k = np.nonzero(np.isfinite(far[:, 1:]))
-        self.b = other[:, 1:][self.a, k]
+        distance, neighbour = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=LESS_NOISE.cell)
+        self.a, k = np.nonzero(np.isfinite(distance[:, 1:]))
+        self.b = neighbour[:, 1:][self.a, k]
 
     def differ(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
         """Mean difference of log albedo between neighbours, each held at `COARSE`."""

@@ -39,40 +39,40 @@ class Texels:
     edge: np.ndarray
 
     def part(self, index: np.ndarray) -> Texels:
-        """Some of them."""
+        """The texels at `index`."""
         return Texels(self.texel[index], self.element[index], self.position[index], self.edge[index])
 
 
 def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
     """The texels that show one of some elements ((n,) bool), on triangles of some size."""
-    shown = np.append(wanted, False)[atlas.padding]  # -1: none
-    texel = np.flatnonzero(shown)
+    shows_wanted = np.append(wanted, False)[atlas.padding]  # -1: none
+    texel = np.flatnonzero(shows_wanted)
     size = atlas.size
-    theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
-    corner = atlas.uv[theirs].astype(np.float64) * size
+    triangles = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
+    corner = atlas.uv[triangles].astype(np.float64) * size
     large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * PLANES.least
-    theirs = theirs[large]
-    if not len(theirs):
+    triangles = triangles[large]
+    if not len(triangles):
         return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
     triangle = np.full(size * size, -1, np.int32)
-    triangle[texel] = np.append(theirs, -1)[Unwrapped(atlas.uv[theirs], size).at(texel, np.zeros(2)).triangle]
+    triangle[texel] = np.append(triangles, -1)[Unwrapped(atlas.uv[triangles], size).at(texel, np.zeros(2)).triangle]
     # A border's texels, beside a triangle: what is shown between two texels is the mean of both.
-    bare = texel[triangle[texel] < 0]
-    found = triangle[bare]
+    border = texel[triangle[texel] < 0]
+    nearest = triangle[border]
     for step in (1, -1, size, -size, size + 1, size - 1, 1 - size, -1 - size):
-        beside = bare + step
-        inside = (beside >= 0) & (beside < len(triangle))
-        found = np.where((found < 0) & inside, triangle[np.where(inside, beside, 0)], found)
-    triangle[bare] = found
-    element, of = atlas.padding[texel], triangle[texel]
-    kept = of >= 0
-    kept[kept] = mesh.object_id[of[kept]] == atlas.object_id[element[kept]]
-    texel, element, of = texel[kept], element[kept], of[kept]
-    known, which = np.unique(of, return_inverse=True)
-    origin, along = texel_axes(atlas, mesh, known)
-    edge = np.sqrt(np.linalg.norm(np.cross(along[..., 0], along[..., 1]), axis=1))[which]
+        neighbour = border + step
+        inside = (neighbour >= 0) & (neighbour < len(triangle))
+        nearest = np.where((nearest < 0) & inside, triangle[np.where(inside, neighbour, 0)], nearest)
+    triangle[border] = nearest
+    element, owner = atlas.padding[texel], triangle[texel]
+    valid = owner >= 0
+    valid[valid] = mesh.object_id[owner[valid]] == atlas.object_id[element[valid]]
+    texel, element, owner = texel[valid], element[valid], owner[valid]
+    owners, index = np.unique(owner, return_inverse=True)
+    origin, along = texel_axes(atlas, mesh, owners)
+    edge = np.sqrt(np.linalg.norm(np.cross(along[..., 0], along[..., 1]), axis=1))[index]
     at = np.stack([texel % size, texel // size], 1) + 0.5
-    position = origin[which] + along[which, :, 0] * at[:, :1] + along[which, :, 1] * at[:, 1:]
+    position = origin[index] + along[index, :, 0] * at[:, :1] + along[index, :, 1] * at[:, 1:]
     return Texels(texel, element, position, edge)
 
 
@@ -117,33 +117,33 @@ class Plane:
         return np.abs(position @ self.normal - self.offset) < COPLANAR.off
 
 
-def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray) -> Iterator[Plane]:
-    """Planes of an object's elements `own` ((m,) int), by how much of them is `filled` ((n,) bool), most first."""
-    normal, position = atlas.normal[own].astype(np.float64), atlas.position[own].astype(np.float64)
-    weight = np.where(filled[own], atlas.area[own], 0).astype(np.float64)
-    least, random = LEVELS.many * atlas.texel_edge**2, np.random.default_rng(0)
+def planes_of(atlas: Atlas, elements: np.ndarray, filled: np.ndarray) -> Iterator[Plane]:
+    """Planes of an object's `elements` ((m,) int), by how much of them is `filled` ((n,) bool), most first."""
+    normal, position = atlas.normal[elements].astype(np.float64), atlas.position[elements].astype(np.float64)
+    weight = np.where(filled[elements], atlas.area[elements], 0).astype(np.float64)
+    min_area, rng = LEVELS.many * atlas.texel_edge**2, np.random.default_rng(0)
 
-    def within(direction: np.ndarray, offset: float, some: np.ndarray) -> np.ndarray:
-        off = np.abs(position[some] @ direction - offset)
-        return (normal[some] @ direction > np.cos(COPLANAR.turn)) & (off < COPLANAR.off)
+    def within(direction: np.ndarray, offset: float, index: np.ndarray) -> np.ndarray:
+        off = np.abs(position[index] @ direction - offset)
+        return (normal[index] @ direction > np.cos(COPLANAR.turn)) & (off < COPLANAR.off)
 
-    left = np.ones(len(own), bool)
+    remaining = np.ones(len(elements), bool)
     for _ in range(PLANES.planes):
-        total = (weight * left).sum()
-        if total < least:
+        total = (weight * remaining).sum()
+        if total < min_area:
             return
-        drawn = random.choice(len(own), LEVELS.sample, p=weight * left / total)
-        tried = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: PLANES.tries]]
-        best = drawn[max(tried, key=np.count_nonzero)]
+        drawn = rng.choice(len(elements), LEVELS.sample, p=weight * remaining / total)
+        inliers = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: PLANES.tries]]
+        best = drawn[max(inliers, key=np.count_nonzero)]
         direction = normal[best].mean(0)
         direction /= np.linalg.norm(direction)
         offset = float(np.median(position[best] @ direction))
-        members = np.flatnonzero(left)
+        members = np.flatnonzero(remaining)
         members = members[within(direction, offset, members)]
-        if weight[members].sum() < least:
+        if weight[members].sum() < min_area:
             return
-        left[members] = False
-        yield Plane(direction, offset, own[members])
+        remaining[members] = False
+        yield Plane(direction, offset, elements[members])
 
 
 @dataclass(frozen=True)
@@ -170,17 +170,17 @@ class Picture:
     def of(cls, atlas: Atlas, mesh: Mesh, known: np.ndarray, wanted: Texels) -> Picture:
         """The picture of a plane's elements `known` ((m,) int), and of what is wanted in it and around."""
         axes = _axes(atlas, mesh, known)
-        cells, at = (np.asarray(one, np.float64) @ axes for one in (atlas.position[known], wanted.position))
+        cells, targets = (np.asarray(points, np.float64) @ axes for points in (atlas.position[known], wanted.position))
         low, high = cells.min(0), cells.max(0)
         size, reach = 1 / np.sqrt(np.linalg.norm(np.cross(*axes.T))), high - low
-        inside = ((at >= low - reach) & (at <= high + reach)).all(1) & (wanted.edge < PLANES.stretch * size)
-        every = np.concatenate([cells, at[inside]])
+        inside = ((targets >= low - reach) & (targets <= high + reach)).all(1) & (wanted.edge < PLANES.stretch * size)
+        grid = np.concatenate([cells, targets[inside]])
         # Rounded, not cut off: where texels and cells are the same each texel lies in the middle of its cell.
-        every = np.rint(every - every.min(0)).astype(np.int64)
-        coarser = int(np.ceil(np.sqrt(np.prod(every.max(0) + 1.0) / PLANES.cells)))
-        every //= coarser
-        shape = (int(every[:, 0].max()) + 1, int(every[:, 1].max()) + 1)
-        flat = every[:, 0] * shape[1] + every[:, 1]
+        grid = np.rint(grid - grid.min(0)).astype(np.int64)
+        coarser = int(np.ceil(np.sqrt(np.prod(grid.max(0) + 1.0) / PLANES.cells)))
+        grid //= coarser
+        shape = (int(grid[:, 0].max()) + 1, int(grid[:, 1].max()) + 1)
+        flat = grid[:, 0] * shape[1] + grid[:, 1]
         return cls(shape, flat[: len(cells)], wanted.texel[inside], flat[len(cells) :])
 
     def paint(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -218,5 +218,5 @@ def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray) -> np.ndarray:
     square = length.max() < PLANES.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
     if not square or not 1 / PLANES.stretch < length.mean() / atlas.texel_edge < PLANES.stretch:
         normal = mesh.geometry[0][largest : largest + 1]
-        along = np.stack([one[0] for one in tangent_frame(normal)], 1).astype(np.float64) * atlas.texel_edge
+        along = np.stack([tangent[0] for tangent in tangent_frame(normal)], 1).astype(np.float64) * atlas.texel_edge
     return np.linalg.pinv(along).T

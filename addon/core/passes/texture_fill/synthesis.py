@@ -89,27 +89,27 @@ def scale_of(covariance: np.ndarray, overlap: np.ndarray) -> float:
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in covariance.shape)
     ring = np.rint(np.hypot(rows[:, None], columns[None])).astype(int).ravel()
     mean = np.bincount(ring, (covariance * overlap).ravel()) / np.maximum(np.bincount(ring, overlap.ravel()), 1)
-    least = TEXTURE.decay * mean[1]
-    below = np.flatnonzero(mean[1:] < least)
+    threshold = TEXTURE.decay * mean[1]
+    below = np.flatnonzero(mean[1:] < threshold)
     if mean[1] <= 0 or not len(below):
         return np.inf
     last = int(below[0])
-    return last + float((mean[last] - least) / max(mean[last] - mean[last + 1], 1e-30))
+    return last + float((mean[last] - threshold) / max(mean[last] - mean[last + 1], 1e-30))
 
 
-def usual_contrast(picture: np.ndarray, known: np.ndarray, edge: float) -> float:
+def typical_contrast(picture: np.ndarray, known: np.ndarray, edge: float) -> float:
     """Standard deviation of what neighbouring cells have in common, in the median over squares of some cells' edge.
 
     A stain, a highlight or a fringe is in few of them, a texture in most; noise is in none.
     """
     pairs, products = np.zeros(known.shape, np.float32), np.zeros(known.shape, np.float32)
     for shift in ((0, 1), (1, 0)):
-        both = known & shifted(known, shift)
-        pairs += both
-        products += np.where(both, (picture * shifted(picture, shift)).mean(2), 0)
-    count, total = (block_mean(one, max(int(edge), 1)) for one in (pairs, products))
-    told = count > 0.5  # a quarter of its pairs
-    return float(np.sqrt(max(np.median(total[told] / count[told]), 0))) if told.any() else 0.0
+        overlap = known & shifted(known, shift)
+        pairs += overlap
+        products += np.where(overlap, (picture * shifted(picture, shift)).mean(2), 0)
+    count, total = (block_mean(pair_image, max(int(edge), 1)) for pair_image in (pairs, products))
+    enough = count > 0.5  # a quarter of its pairs
+    return float(np.sqrt(max(np.median(total[enough] / count[enough]), 0))) if enough.any() else 0.0
 
 
 def dominant_offsets(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, apart: float) -> list[tuple[int, int]]:
@@ -122,13 +122,13 @@ def dominant_offsets(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, 
     """
     covariance, overlap = autocovariance(picture, source)
     shape, reach = covariance.shape, max(int(round(apart)), 1)
-    top = (ndimage.maximum_filter(covariance, 2 * reach + 1, mode="wrap") == covariance) & (overlap > reach * reach)
+    is_peak = (ndimage.maximum_filter(covariance, 2 * reach + 1, mode="wrap") == covariance) & (overlap > reach * reach)
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
-    top &= np.hypot(rows[:, None], columns[None]) > reach
-    peaks = np.flatnonzero(top)
-    alike = np.square(np.maximum(covariance.ravel()[peaks] / covariance[0, 0], TEXTURE.unlike))
-    best = np.argsort(-alike, kind="stable")[: TEXTURE.peaks]
-    shift, alike = np.stack(np.divmod(peaks[best], shape[1]), 1), alike[best]
+    is_peak &= np.hypot(rows[:, None], columns[None]) > reach
+    peaks = np.flatnonzero(is_peak)
+    similarity = np.square(np.maximum(covariance.ravel()[peaks] / covariance[0, 0], TEXTURE.unlike))
+    best = np.argsort(-similarity, kind="stable")[: TEXTURE.peaks]
+    shift, similarity = np.stack(np.divmod(peaks[best], shape[1]), 1), similarity[best]
     shift -= np.where(2 * shift > shape, shape, 0)
     # Which of them have something for which cells of the hole, some of them for all.
     cells = np.argwhere(hole)
@@ -136,17 +136,17 @@ def dominant_offsets(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, 
     at = cells + shift[:, None]
     inside = ((at >= 0) & (at < source.shape)).all(2)
     covers = inside & source[tuple(np.moveaxis(np.where(inside[..., None], at, 0), 2, 0))]
-    found: list[tuple[int, int]] = []
-    open_ = np.ones(len(cells), np.float32)
-    while len(found) < TEXTURE.offsets and alike.any():
-        score = alike * (covers @ open_)
+    offsets: list[tuple[int, int]] = []
+    uncovered = np.ones(len(cells), np.float32)
+    while len(offsets) < TEXTURE.offsets and similarity.any():
+        score = similarity * (covers @ uncovered)
         k = int(score.argmax())
         if not score[k]:
             break
-        alike[k] = 0
-        found.append((int(shift[k, 0]), int(shift[k, 1])))
-        open_[covers[k]] *= np.float32(TEXTURE.again)
-    return found
+        similarity[k] = 0
+        offsets.append((int(shift[k, 0]), int(shift[k, 1])))
+        uncovered[covers[k]] *= np.float32(TEXTURE.again)
+    return offsets
 
 
 def shifted(values: np.ndarray, shift: tuple[int, int]) -> np.ndarray:
@@ -174,14 +174,14 @@ def _labels(picture, source, hole, copies, edge) -> np.ndarray:
         return block_mean(values * valid[..., None], edge) / np.maximum(share, 1e-6)[..., None], share > 0.5
 
     current, settled = blocks(picture, source)
-    told, coarse = settled.copy(), [blocks(*one) for one in copies]
+    known, coarse = settled.copy(), [blocks(*pair) for pair in copies]
     # How far a copy is off wherever both are known: what is expected of it before anything around a block is looked at.
-    usual = [_mean_square(current - copy, settled & valid) for copy, valid in coarse]
+    expected = [_mean_square(current - copy, settled & valid) for copy, valid in coarse]
     todo, everywhere = block_mean(hole, edge) > 0, False
     chosen = np.full(todo.shape, -1)
-    window, around = 2 * TEXTURE.blocks + 1, np.ones((3, 3), bool)
+    window, structure = 2 * TEXTURE.blocks + 1, np.ones((3, 3), bool)
     while True:
-        front = ndimage.binary_dilation(settled, around, TEXTURE.blocks // 2) & todo
+        front = ndimage.binary_dilation(settled, structure, TEXTURE.blocks // 2) & todo
         if not front.any():
             if everywhere or not todo.any():
                 return chosen
@@ -191,20 +191,21 @@ def _labels(picture, source, hole, copies, edge) -> np.ndarray:
         place = np.flatnonzero(front)
         cost, label = np.full(len(place), np.inf), np.full(len(place), -1)
         for k, (copy, valid) in enumerate(coarse):
-            both = settled & valid
-            off = np.where(both, np.square(current - copy).sum(2), 0)
+            overlap = settled & valid
+            squared = np.where(overlap, np.square(current - copy).sum(2), 0)
             count, total = (
-                ndimage.uniform_filter(one.astype(np.float32), window, mode="constant")[front] for one in (both, off)
+                ndimage.uniform_filter(image.astype(np.float32), window, mode="constant")[front]
+                for image in (overlap, squared)
             )
             compared = valid[front] & (count * window * window > 0.5)
-            mean = np.where(compared, (total + TEXTURE.before * usual[k]) / (count + TEXTURE.before), np.inf)
+            mean = np.where(compared, (total + TEXTURE.before * expected[k]) / (count + TEXTURE.before), np.inf)
             better = mean < cost
             cost[better], label[better] = mean[better], k
         for k in np.unique(label[label >= 0]):
             at = np.unravel_index(place[label == k], chosen.shape)
             chosen[at] = k
-            fresh = tuple(axis[~told[at]] for axis in at)
-            current[fresh] = coarse[k][0][fresh]
+            unknown = tuple(axis[~known[at]] for axis in at)
+            current[unknown] = coarse[k][0][unknown]
             settled[at] = True
 
 
@@ -232,7 +233,7 @@ def smooth_mean(picture: np.ndarray, known: np.ndarray, sigma: float) -> np.ndar
     result, missing, width = np.zeros_like(total), np.ones_like(share), sigma / edge
     while True:
         mass, *sums = (
-            ndimage.gaussian_filter(one, width, mode="constant") for one in (share, *np.moveaxis(total, 2, 0))
+            ndimage.gaussian_filter(image, width, mode="constant") for image in (share, *np.moveaxis(total, 2, 0))
         )
         last = width > max(share.shape)
         # Where less than a quarter is known, the mean over twice the width takes the rest.
@@ -243,5 +244,5 @@ def smooth_mean(picture: np.ndarray, known: np.ndarray, sigma: float) -> np.ndar
             break
         width *= 2
     grid = np.meshgrid(*((np.arange(n) + 0.5) / edge - 0.5 for n in known.shape), indexing="ij")
-    channels = [ndimage.map_coordinates(one, grid, order=1, mode="nearest") for one in np.moveaxis(result, 2, 0)]
+    channels = [ndimage.map_coordinates(image, grid, order=1, mode="nearest") for image in np.moveaxis(result, 2, 0)]
     return np.stack(channels, -1)

@@ -12,7 +12,7 @@ from ...scene.model import Mesh
 from ...significance import LEVELS, SIGMA_OF_MAD
 from .params import TEXTURE
 from .planes import Picture, planes_of, texels_of
-from .synthesis import autocovariance, completed, scale_of, smooth_mean, usual_contrast
+from .synthesis import autocovariance, completed, scale_of, smooth_mean, typical_contrast
 
 
 @dataclass(frozen=True)
@@ -51,42 +51,46 @@ def texture_of(
     Texture
         Of planes whose measured part has detail beyond its error, and enough of it.
     """
-    level, told = np.log(np.maximum(rho.mean(1), LEVELS.dark)), []
+    level, textures = np.log(np.maximum(rho.mean(1), LEVELS.dark)), []
     objects = [
-        own for own in by_label(atlas.object_id) if filled[own].any() and _textured(level, error, own[measured[own]])
+        elements
+        for elements in by_label(atlas.object_id)
+        if filled[elements].any() and _textured(level, error, elements[measured[elements]])
     ]
     wanted = np.zeros(len(atlas), bool)
-    for own in objects:
-        wanted[own] = filled[own]
+    for elements in objects:
+        wanted[elements] = filled[elements]
     if not objects:
         return NOTHING
     texels = texels_of(atlas, mesh, wanted)
-    shown = by_number(atlas.object_id[texels.element])
-    for own in objects:
-        mine = texels.part(shown.get(int(atlas.object_id[own[0]]), np.zeros(0, np.int64)))
-        for plane in planes_of(atlas, own, filled):
+    texels_of_object = by_number(atlas.object_id[texels.element])
+    for elements in objects:
+        object_texels = texels.part(texels_of_object.get(int(atlas.object_id[elements[0]]), np.zeros(0, np.int64)))
+        for plane in planes_of(atlas, elements, filled):
             known = plane.members[measured[plane.members]]
-            there = mine.part(plane.near(mine.position) & (np.isin(mine.element, plane.members)))
-            if _textured(level, error, known) and len(there.texel) >= LEVELS.many:
-                picture = Picture.of(atlas, mesh, known, there)
-                told.append(_filled(picture, rho[known], error[known]))
-    if not told:
+            plane_texels = object_texels.part(
+                plane.near(object_texels.position) & (np.isin(object_texels.element, plane.members))
+            )
+            if _textured(level, error, known) and len(plane_texels.texel) >= LEVELS.many:
+                picture = Picture.of(atlas, mesh, known, plane_texels)
+                textures.append(_filled(picture, rho[known], error[known]))
+    if not textures:
         return NOTHING
-    texel, value = (np.concatenate(parts) for parts in zip(*told, strict=True))
+    texel, value = (np.concatenate(parts) for parts in zip(*textures, strict=True))
     return Texture(texel, value)
 
 
-def _of_others(log: np.ndarray, source: np.ndarray, known: np.ndarray, error: float) -> np.ndarray:
+def _foreign(log: np.ndarray, source: np.ndarray, known: np.ndarray, error: float) -> np.ndarray:
     """Cells that belong to something else in the plane, (h, w) bool: outliers side by side as far as the picture's rim.
 
     A hearth in a scan's floor, the feet of a table, the fringe of a sofa. An outlier that nothing unknown borders, a
     dark tile or a knot, is part of the texture.
     """
-    off = np.abs(log - np.median(log[source], 0))
-    spread = np.maximum(SIGMA_OF_MAD * np.median(off[source], 0), error)
-    odd = known & (off > LEVELS.sigmas * spread).any(2)
-    wide = odd & (ndimage.uniform_filter(odd.astype(np.float32), TEXTURE.mostly, mode="constant") > 0.5)
-    label, _ = ndimage.label(ndimage.binary_propagation(wide, mask=odd))
+    deviation = np.abs(log - np.median(log[source], 0))
+    spread = np.maximum(SIGMA_OF_MAD * np.median(deviation[source], 0), error)
+    outlier = known & (deviation > LEVELS.sigmas * spread).any(2)
+    wide = outlier & (ndimage.uniform_filter(outlier.astype(np.float32), TEXTURE.mostly, mode="constant") > 0.5)
+    label, _ = ndimage.label(ndimage.binary_propagation(wide, mask=outlier))
     at_rim = np.setdiff1d(label[ndimage.binary_dilation(~known, border_value=1)], [0])
     return np.isin(label, at_rim)
 
@@ -102,26 +106,26 @@ def _beyond(contrast: float, error: np.ndarray) -> bool:
 
 def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Texels of one plane and their albedo; none where there is too little to go by."""
-    shown, known = picture.paint(rho)
-    # As where neighbourhoods are told: what was seen well, the better half at least; and no albedo that was cut off.
-    usual = float(np.median(error))
-    sure = (error <= max(LEVELS.sure, usual)) & (rho.max(1) < 1)
+    painted, known = picture.paint(rho)
+    # As in the neighbourhood prior: what was measured well, the better half at least; and no clamped albedo.
+    typical_error = float(np.median(error))
+    sure = (error <= max(LEVELS.sure, typical_error)) & (rho.max(1) < 1)
     around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], TEXTURE.mostly, mode="constant")
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:
         return NOTHING.texel, NOTHING.rho
-    log = np.log(np.maximum(shown, LEVELS.dark))
-    own = known & ~_of_others(log, source, known, usual)
-    source &= own
+    log = np.log(np.maximum(painted, LEVELS.dark))
+    same_surface = known & ~_foreign(log, source, known, typical_error)
+    source &= same_surface
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))
     if source.sum() < TEXTURE.samples * scale**2:
         return NOTHING.texel, NOTHING.rho
-    smooth = np.maximum(smooth_mean(shown, own, TEXTURE.smooth * scale), LEVELS.dark)
+    smooth = np.maximum(smooth_mean(painted, same_surface, TEXTURE.smooth * scale), LEVELS.dark)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
-    if not _beyond(usual_contrast(detail, source, TEXTURE.smooth * scale), error):
+    if not _beyond(typical_contrast(detail, source, TEXTURE.smooth * scale), error):
         return NOTHING.texel, NOTHING.rho
     copy, done = completed(detail, source, picture.hole & ~known, scale)
-    got = (done | known).ravel()[picture.wanted]
-    value = (np.exp(copy) * smooth).reshape(-1, 3)[picture.wanted[got]]
-    return picture.texel[got], np.clip(value, 0, 1).astype(np.float32)
+    filled = (done | known).ravel()[picture.wanted]
+    value = (np.exp(copy) * smooth).reshape(-1, 3)[picture.wanted[filled]]
+    return picture.texel[filled], np.clip(value, 0, 1).astype(np.float32)

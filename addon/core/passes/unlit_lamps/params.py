@@ -1,4 +1,4 @@
-"""By what it is told that a lamp is dark with its light off."""
+"""What lamps are taken to reflect with their light off."""
 
 from dataclasses import dataclass
 

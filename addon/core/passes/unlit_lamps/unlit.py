@@ -20,7 +20,7 @@ SURFACE = "With its light off it is as grey as the surface that it is a piece of
 
 
 def unlit(
-    instance: Instance, field: LightField, irradiance: np.ndarray, told: np.ndarray, seed: int = 0
+    instance: Instance, field: LightField, irradiance: np.ndarray, measured: np.ndarray, seed: int = 0
 ) -> tuple[float | None, str]:
     """Albedo of a lamp with its light off, and a sentence on why; None where nothing tells.
 
@@ -28,8 +28,8 @@ def unlit(
     ----------
     irradiance : (n, 3) float
         E.
-    told : (n,) bool
-        Elements whose albedo L_d and E tell.
+    measured : (n,) bool
+        Elements whose albedo follows from L_d and E.
     """
     words = re.split(r"[^a-z]+", instance.class_name.casefold())
     if set(words) & set(UNLIT.dark_classes):
@@ -37,22 +37,22 @@ def unlit(
     if not looks_outside(instance.object_id, field, seed):
         return None, ""
     # Behind a wall that was fused from depth there is nothing either, and where panes are it mostly has holes.
-    around = of_surface(instance.object_id, field, irradiance, told) if field.mesh.whole else None
+    around = of_surface(instance.object_id, field, irradiance, measured) if field.mesh.whole else None
     return (UNLIT.dark, OUTSIDE) if around is None else (around, SURFACE)
 
 
-def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, told: np.ndarray) -> float | None:
+def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, measured: np.ndarray) -> float | None:
     """Median albedo (its luminance) of what else lies in the plane of a patch; None where too little is told.
 
     Wall beside a shade may be so bright that it is taken for a lamp. A halo is left around it: the whole wall counts.
     """
     atlas = field.atlas
-    own = atlas.elements_of(object_id)
-    normal = atlas.normal[own].mean(0)
+    elements = atlas.elements_of(object_id)
+    normal = atlas.normal[elements].mean(0)
     normal = normal / max(np.linalg.norm(normal), 1e-9)
-    height = np.abs((atlas.position - atlas.position[own].mean(0)) @ normal)
-    near = told & (irradiance > 0).all(1) & (atlas.object_id != object_id) & (atlas.normal @ normal > 0)
-    near &= height < height[own].max() + atlas.texel_edge
+    height = np.abs((atlas.position - atlas.position[elements].mean(0)) @ normal)
+    near = measured & (irradiance > 0).all(1) & (atlas.object_id != object_id) & (atlas.normal @ normal > 0)
+    near &= height < height[elements].max() + atlas.texel_edge
     if near.sum() < LEVELS.enough:
         return None
     return float(min(np.median(albedo(field.radiance[near] @ LUMINANCE, irradiance[near] @ LUMINANCE)), 1))
@@ -61,30 +61,30 @@ def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, told: 
 def looks_outside(object_id: int, field: LightField, seed: int = 0) -> bool:
     """Whether a lamp is an upright pane with the room on one side of it and nothing on the other."""
     mesh = field.mesh
-    mine = mesh.object_id == object_id
-    normal, area = mesh.geometry[0][mine].astype(np.float64), mesh.geometry[1][mine]
-    own = field.atlas.elements_of(object_id)
-    if not len(own) or not area.sum():
+    triangles = mesh.object_id == object_id
+    normal, area = mesh.geometry[0][triangles].astype(np.float64), mesh.geometry[1][triangles]
+    elements = field.atlas.elements_of(object_id)
+    if not len(elements) or not area.sum():
         return False
     share, axes = np.linalg.eigh((area[:, None, None] * normal[:, :, None] * normal[:, None]).sum(0) / area.sum())
     axis = axes[:, 2]
     if share[2] < UNLIT.flat or abs(axis[2]) > np.sin(UNLIT.upright):
         return False
-    along = mesh.vertices[mesh.triangles[mine]].reshape(-1, 3) @ axis
+    along = mesh.vertices[mesh.triangles[triangles]].reshape(-1, 3) @ axis
     random = np.random.default_rng(seed)
-    weight = field.atlas.area[own].astype(np.float64)
-    start = field.atlas.position[random.choice(own, LIGHT_FIT.rays, p=weight / weight.sum())]
+    weight = field.atlas.area[elements].astype(np.float64)
+    start = field.atlas.position[random.choice(elements, LIGHT_FIT.rays, p=weight / weight.sum())]
     local, (low, high) = cosine_hemisphere(sobol(LIGHT_FIT.rays, seed)), field.atlas.box
     leaving = []
     for side, plane in ((axis, along.max()), (-axis, -along.min())):
         # From beyond the pane's own far face.
         beyond = start + (plane - start @ side)[:, None] * side
-        turn = np.broadcast_to(side.astype(np.float32), beyond.shape)
-        directions = to_world(local[:, None], turn)[:, 0]
-        hits = field.scene.intersect(field.scene.off_surface(beyond.astype(np.float32), turn), directions)
-        met = beyond + np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * directions
+        normals = np.broadcast_to(side.astype(np.float32), beyond.shape)
+        directions = to_world(local[:, None], normals)[:, 0]
+        hits = field.scene.intersect(field.scene.off_surface(beyond.astype(np.float32), normals), directions)
+        hit = beyond + np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * directions
         margin = field.scene.offset
-        inside = ((met > low - margin) & (met < high + margin)).all(1)
+        inside = ((hit > low - margin) & (hit < high + margin)).all(1)
         leaving.append(float(((hits.triangle < 0) | ~inside).mean()))
     # A kitchen's window has .88; its strips, and ceiling lamps, bulbs, spots and panels of six more rooms 0 to .04.
     return max(leaving) >= 0.5 > min(leaving)

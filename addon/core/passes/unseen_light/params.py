@@ -1,4 +1,4 @@
-"""What it takes to believe in light that no frame sees; what each part gains: docs/ablation.md."""
+"""When light that no frame sees is believed in; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 

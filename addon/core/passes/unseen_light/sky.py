@@ -50,26 +50,26 @@ class Sky:
 
     def without(self, parts: Collection[int]) -> Sky:
         """The other parts, at the radiance that they have."""
-        kept = [i for i in range(len(self.contribution)) if i not in parts]
+        others = [i for i in range(len(self.contribution)) if i not in parts]
         lists = (self.contribution, self.radiance, self.clipped, self.told)
-        return Sky(*([one[i] for i in kept] for one in lists))  # type: ignore[arg-type]
+        return Sky(*([values[i] for i in others] for values in lists))  # type: ignore[arg-type]
 
     def notes(self) -> list[str]:
         """One sentence for each part that was solved."""
-        said = []
+        notes = []
         for i in sorted(self.solved):
-            values, guess = (", ".join(f"{x:.3g}" for x in one[i]) for one in (self.radiance, self.guess))
+            values, guess = (", ".join(f"{x:.3g}" for x in radiances[i]) for radiances in (self.radiance, self.guess))
             if self.clipped[i]:
-                said.append(
+                notes.append(
                     "Part of the sky is clipped in every frame that sees it; it was solved from the light it "
                     f"throws: radiance {values} (at least {guess})."
                 )
             else:
-                said.append(
+                notes.append(
                     f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
                     f"{values} (its seen neighbours: {guess})."
                 )
-        return said
+        return notes
 
 
 def all_light(

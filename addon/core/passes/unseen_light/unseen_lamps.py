@@ -20,21 +20,23 @@ def solve_lamps(sample: Sample, contribution, least, kinds: LampKinds, kin, seen
     """
     sent = sample.radiance @ LUMINANCE
     gain = {i: 0.0 if i in kin else UNSEEN.lamp_gain for i in contribution}
-    least = {i: max(most, kin.get(i, 0.0) / LIGHT_FIT.reach) for i, most in least.items()}
+    least = {i: max(bound, kin.get(i, 0.0) / LIGHT_FIT.reach) for i, bound in least.items()}
     lamps: list[Lamp] = []
-    left = dict(contribution)
-    while left:
+    remaining = dict(contribution)
+    while remaining:
         light = all_light(base, lamps, contribution, sky)
         received = light @ LUMINANCE
-        best = {i: sample.best(sent, received, G) for i, G in left.items()}
-        found = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > least[i]}
-        if not found:
+        best = {i: sample.best(sent, received, G) for i, G in remaining.items()}
+        improving = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > least[i]}
+        if not improving:
             break
-        object_id = min(found, key=lambda i: found[i][2])
-        by_channel = [sample.best(sample.radiance[:, c], light[:, c], left[object_id]) for c in range(3)]
-        same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], kinds.model, seen)
-        lamps.append(_coloured(object_id, *found[object_id], kinds.class_of, same, seen, sample.received, by_channel))
-        del left[object_id]
+        object_id = min(improving, key=lambda i: improving[i][2])
+        by_channel = [sample.best(sample.radiance[:, c], light[:, c], remaining[object_id]) for c in range(3)]
+        same = twin(object_id, improving[object_id][2], sample, sent, received, remaining[object_id], kinds.model, seen)
+        lamps.append(
+            _coloured(object_id, *improving[object_id], kinds.class_of, same, seen, sample.received, by_channel)
+        )
+        del remaining[object_id]
     return lamps
 
 
@@ -50,8 +52,8 @@ def needed(
         solve_sky(sample, sure, contribution, alone, base)
     sent = log_of(sample.radiance @ LUMINANCE)
     with_lamps, without = (
-        sample.spread_under(sent, all_light(base, some, contribution, above) @ LUMINANCE)
-        for some, above in ((lamps, sky), (sure, alone))
+        sample.spread_under(sent, all_light(base, subset, contribution, subset_sky) @ LUMINANCE)
+        for subset, subset_sky in ((lamps, sky), (sure, alone))
     )
     return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (sure, alone)
 
@@ -80,7 +82,7 @@ def _coloured(object_id, s, before, after, class_of, same, seen, received, by_ch
     if same is not None:
         return Lamp(int(object_id), same.radiance, False, spread=spread, twin=same.object_id, solved=float(s))
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
-    solved = [found[0] for found in by_channel if found is not None]
+    solved = [fit[0] for fit in by_channel if fit is not None]
     if not alike and len(solved) == 3:
         colour = np.array(solved, np.float32)
         if abs(float(colour @ LUMINANCE) / s - 1) < LIGHT_FIT.alike:
@@ -101,28 +103,28 @@ def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
         if (G[:, None] * likely).mean() < SKY.least_share * others.mean():
             continue
         bounds = np.transpose(sky.bounds(i))
-        each = [
-            _explaining(sample, sample.radiance[:, c], others[:, c], G, sky.guess[i][c], bounds[c]) for c in range(3)
+        solutions = [
+            _best_radiance(sample, sample.radiance[:, c], others[:, c], G, sky.guess[i][c], bounds[c]) for c in range(3)
         ]
-        found = [s for s in each if s is not None]
-        if len(found) < 3:
+        radiance = [s for s in solutions if s is not None]
+        if len(radiance) < 3:
             continue
-        sky.radiance[i] = np.array(found)
-        if np.array_equal(found, sky.guess[i]):
+        sky.radiance[i] = np.array(radiance)
+        if np.array_equal(radiance, sky.guess[i]):
             sky.solved.discard(i)
         else:
             sky.solved.add(i)
 
 
-def _explaining(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:
+def _best_radiance(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:
     """A channel of a part of the sky: what explains best what is `sent`, or the guess; None if unbounded.
 
     `best` alone does not do: the least radiance that it tries may be far more than there is.
     """
-    found = sample.best(sent, others, contribution)
-    if found is None:
+    fit = sample.best(sent, others, contribution)
+    if fit is None:
         return None
     log_sent = log_of(sent)
     return min(
-        (guess, np.clip(found[0], *bounds)), key=lambda s: sample.spread_under(log_sent, others + s * contribution)
+        (guess, np.clip(fit[0], *bounds)), key=lambda s: sample.spread_under(log_sent, others + s * contribution)
     )

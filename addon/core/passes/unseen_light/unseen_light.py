@@ -78,8 +78,8 @@ class Light:
 
     def without_mixed(self, field: LightField) -> LightField:
         """The field with lamps dark that frames show only mixed."""
-        own = np.isin(field.atlas.object_id, self.mixed)[:, None]
-        return field.with_light(np.where(own, np.float32(0), field.radiance)) if self.mixed else field
+        mixed = np.isin(field.atlas.object_id, self.mixed)[:, None]
+        return field.with_light(np.where(mixed, np.float32(0), field.radiance)) if self.mixed else field
 
 
 def find_light(
@@ -113,7 +113,7 @@ def find_light(
     without : collection of str
         Passes left out.
     """
-    shown, mixed = field, before.mixed if before is not None else ()
+    original, mixed = field, before.mixed if before is not None else ()
     if before is not None:
         field, unseen_objects = before.without_mixed(field), [*unseen_objects, *mixed]
     flat = on_flat(field.atlas)
@@ -125,19 +125,19 @@ def find_light(
     element = pick(field, usable, seed, LEVELS.sample)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)), mixed=mixed)
-    old = before.contribution if before is not None and field.environment.seen else None
-    field, found = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
+    previous = before.contribution if before is not None and field.environment.seen else None
+    field, sky_notes = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     solve_zones = environment.seen and "unseen-sky" not in without
     zones = environment.unknown_zones() if solve_zones else []
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    dark, even, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
-    received = old.received if old else irradiance_at(unlit.with_light(even, known), element, seed)
+    dark, evened_radiance, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
+    received = previous.received if previous else irradiance_at(unlit.with_light(evened_radiance, known), element, seed)
     sky_contributions = (
-        old.sky
-        if old
+        previous.sky
+        if previous
         else [
             irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
         ]
@@ -151,53 +151,59 @@ def find_light(
     if before is None and "unseen-lamps" not in without:
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
-            told = Light((), shown.environment, (), element, filled, mixed=mixed)
-            return find_light(shown, good, unseen_objects, kinds, seed, tilted, shining, told, without)
+            mixed_light = Light((), original.environment, (), element, filled, mixed=mixed)
+            return find_light(original, good, unseen_objects, kinds, seed, tilted, shining, mixed_light, without)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
     if lit.sum() < LEVELS.enough:
-        return Light(tuple(seen), environment, found, element, filled, mixed=mixed)
+        return Light(tuple(seen), environment, sky_notes, element, filled, mixed=mixed)
     sent = field.radiance[element[lit]].astype(np.float64)
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     # The same lamp hung several times is one unknown.
     kin = of_shining_class(seen, atlas.object_id[good], kinds)
-    alike: dict[int, list[int]] = {}
-    for one in unseen_objects:
-        alike.setdefault(kinds.model.get(one, one), []).append(one)
-    alike = {own[0]: own for own in alike.values()}
-    if len(alike) > LEVELS.most:
-        of_class = [i for i in alike if i in kin]
-        others = [i for i in alike if i not in kin]
-        best = reaching_most(field, sample.element, [alike[i] for i in others], LEVELS.most, seed)
-        alike = {i: alike[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
-    earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
+    groups: dict[int, list[int]] = {}
+    for object_id in unseen_objects:
+        groups.setdefault(kinds.model.get(object_id, object_id), []).append(object_id)
+    groups = {group[0]: group for group in groups.values()}
+    if len(groups) > LEVELS.most:
+        of_class = [i for i in groups if i in kin]
+        others = [i for i in groups if i not in kin]
+        best = reaching_most(field, sample.element, [groups[i] for i in others], LEVELS.most, seed)
+        groups = {i: groups[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
+    earlier = previous if previous is not None and np.array_equal(previous.element, sample.element) else None
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
     else:
-        contribution = dict(zip(alike, contributions(field, sample.element, list(alike.values()), seed).T, strict=True))
+        contribution = dict(
+            zip(groups, contributions(field, sample.element, list(groups.values()), seed).T, strict=True)
+        )
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-        lit_room = field.with_light(even, environment)
-        least = {i: most_reflected(lit_room, own, seed) for i, own in alike.items()}
+        lit_room = field.with_light(evened_radiance, environment)
+        least = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
-    surely = {i for i, own in alike.items() if not set(own).isdisjoint(shining)}
+    certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
         lamps = solve_lamps(sample, contribution, least, kinds, kin, seen, sky, received[lit])
         solve_sky(sample, lamps, contribution, sky, received[lit])
-    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], surely)
-    lamps = [replace(lamp, object_id=one, mixed=one in mixed) for lamp in lamps for one in alike[lamp.object_id]]
-    lamps = [as_shown(lamp, shown) if lamp.mixed else lamp for lamp in lamps]
+    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], certain)
+    lamps = [
+        replace(lamp, object_id=object_id, mixed=object_id in mixed)
+        for lamp in lamps
+        for object_id in groups[lamp.object_id]
+    ]
+    lamps = [as_shown(lamp, original) if lamp.mixed else lamp for lamp in lamps]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
-    everything = irradiance_at(
+    irradiance = irradiance_at(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
-    sure = bright_all_over(field, element, everything)
-    kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
-    notes = found + tuple(sky.notes())
-    return Light(tuple(sure) + tuple(lamps), environment, notes, element, everything, kept, mixed)
+    sure = bright_all_over(field, element, irradiance)
+    reusable = Contributions(sunless, sky_contributions, sample.element, contribution, least)
+    notes = sky_notes + tuple(sky.notes())
+    return Light(tuple(sure) + tuple(lamps), environment, notes, element, irradiance, reusable, mixed)
 
 
 def bright_all_over(field: LightField, element: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:
@@ -205,14 +211,14 @@ def bright_all_over(field: LightField, element: np.ndarray, irradiance: np.ndarr
 
     The pixels that show a small metal unmixed may be those of a highlight.
     """
-    atlas, found = field.atlas, []
+    atlas, lamps = field.atlas, []
     for lamp in find_seen(atlas.object_id[element], field.radiance[element], irradiance):
-        own = atlas.elements_of(lamp.object_id)
-        own = own[field.radiance[own].any(1)]
+        elements = atlas.elements_of(lamp.object_id)
+        elements = elements[field.radiance[elements].any(1)]
         E = np.median(irradiance[atlas.object_id[element] == lamp.object_id], 0)
-        if find_seen(atlas.object_id[own], field.radiance[own], np.broadcast_to(E, (len(own), 3))):
-            found.append(lamp)
-    return found
+        if find_seen(atlas.object_id[elements], field.radiance[elements], np.broadcast_to(E, (len(elements), 3))):
+            lamps.append(lamp)
+    return lamps
 
 
 def as_shown(lamp: Lamp, field: LightField) -> Lamp:

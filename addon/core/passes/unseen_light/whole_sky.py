@@ -24,35 +24,35 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
         return field, ()
     received = irradiance_at(field.with_light(evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
-    left = np.ones(len(element), bool)
-    found = None
+    usable = np.ones(len(element), bool)
+    fit = None
     for _ in range(UNSEEN.sweeps):
-        sample = Sample(element[left], object_id[left], sent[left], received[left])
-        found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, contribution[left])
-        if found is None or found[2] > (1 - LEVELS.gain) * found[1]:
+        sample = Sample(element[usable], object_id[usable], sent[usable], received[usable])
+        fit = sample.best(sent[usable] @ LUMINANCE, received[usable] @ LUMINANCE, contribution[usable])
+        if fit is None or fit[2] > (1 - LEVELS.gain) * fit[1]:
             return field, ()
         # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
-        lamps = find_seen(object_id, sent, received + found[0] * contribution[:, None])
-        left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
-        if left.sum() < LEVELS.enough:
+        lamps = find_seen(object_id, sent, received + fit[0] * contribution[:, None])
+        usable = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
+        if usable.sum() < LEVELS.enough:
             return field, ()
-    assert found is not None  # there was a sweep
-    radiance = np.full(3, found[0])
+    assert fit is not None  # there was a sweep
+    radiance = np.full(3, fit[0])
     at = np.searchsorted(element, sample.element)
     by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], contribution[at]) for c in range(3)]
-    solved = [one[0] for one in by_channel if one is not None]
+    solved = [channel[0] for channel in by_channel if channel is not None]
     if len(solved) == 3:
         radiance = np.array(solved)
     # No object reflects more than it gets.
     least = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
         :, None
     ]
-    for one in np.unique(sample.object_id):
-        radiance = np.maximum(radiance, np.median(least[object_id[left] == one], 0))
+    for number in np.unique(sample.object_id):
+        radiance = np.maximum(radiance, np.median(least[object_id[usable] == number], 0))
     note = (
         "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
         f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "
-        f"(spread of log albedo {found[1]:.3f} to {found[2]:.3f})."
+        f"(spread of log albedo {fit[1]:.3f} to {fit[2]:.3f})."
     )
     sky = Environment(np.broadcast_to(np.float32(radiance), (1, 2, 3)).copy(), np.zeros((1, 2), np.int32))
     return field.with_light(field.radiance, sky), (note,)

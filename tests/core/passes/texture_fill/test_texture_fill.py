@@ -12,7 +12,7 @@ from addon.core.passes.texture_fill.synthesis import (
     dominant_offsets,
     scale_of,
     smooth_mean,
-    usual_contrast,
+    typical_contrast,
 )
 from addon.core.passes.texture_fill.texture_fill import texture_of
 from tests.core.rooms import box_sides, make_room
@@ -170,11 +170,11 @@ def test_contrast_is_what_most_of_a_picture_has():
     rows, columns = np.mgrid[:200, :200]
     tiles = np.where((rows // 10 + columns // 10) % 2 > 0, 0.3, -0.3).astype(np.float32)[..., None]
     everywhere = np.ones((200, 200), bool)
-    assert usual_contrast(tiles, everywhere, 40) == pytest.approx(0.3, rel=0.15)
+    assert typical_contrast(tiles, everywhere, 40) == pytest.approx(0.3, rel=0.15)
     stain = np.where(rows < 50, 1.0, 0.0).astype(np.float32)[..., None] * tiles
     noise = 0.3 * np.random.default_rng(1).normal(size=(200, 200, 1)).astype(np.float32)
     for picture in (stain, noise):
-        assert usual_contrast(picture, everywhere, 40) < 0.03
+        assert typical_contrast(picture, everywhere, 40) < 0.03
 
 
 def test_the_slow_part_is_carried_on():
