@@ -70,6 +70,25 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
+def specular_error(lit_diffuse: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
+    """Relative standard error that a difference has as its subtrahend's is `ALBEDO.specular_error`.
+
+    Where a highlight was most of what frames saw, little is known of what is left: burnt wood under a window's image.
+
+    Parameters
+    ----------
+    lit_diffuse : (n, 3) float32
+        L_d with its `specular` part, (n, 3) or 0. Either may hold NaN: nothing was measured there.
+
+    Returns
+    -------
+    (n,) float32
+    """
+    taken = np.maximum(np.nan_to_num(np.broadcast_to(specular, lit_diffuse.shape)), 0).sum(1)
+    left = np.maximum(np.nan_to_num(lit_diffuse).sum(1) - taken, ALBEDO.floor * taken)
+    return ALBEDO.specular_error * np.divide(taken, left, out=np.zeros(len(taken), np.float32), where=left > 0)
+
+
 def without_emitters(atlas: Atlas, mask: np.ndarray, emitters: set[int]) -> np.ndarray:
     """The elements of `mask`, (n,) bool, that are no emitter's."""
     return mask & ~np.isin(atlas.object_id, list(emitters))
@@ -107,6 +126,8 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), irradiance_error)
+    if "specular-error" not in without:
+        error = np.hypot(error, specular_error(lit_diffuse.radiance, specular))
     valid &= lit_diffuse.seen
     if "bias-field" not in without:
         rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))

@@ -5,9 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.passes.albedo.albedo import FILLED, MEASURED, NONE, above_one, fill, quotient, without_emitters
+from addon.core.passes.albedo.albedo import (
+    FILLED,
+    MEASURED,
+    NONE,
+    above_one,
+    albedo_of,
+    fill,
+    quotient,
+    specular_error,
+    without_emitters,
+)
 from addon.core.passes.albedo.params import ALBEDO
-from tests.core.rooms import box_sides, make_room
+from addon.core.scene.lit_diffuse import LitDiffuse
+from addon.core.scene.visibility import CLEAN
+from tests.core.rooms import box_sides, make_room, quad
 
 NAN = np.nan
 
@@ -105,3 +117,39 @@ def test_a_room_where_nothing_was_measured(atlas):
     rho = np.full((len(atlas), 3), NAN, np.float32)
     result = fill(atlas, rho, none, {}, set())
     assert np.allclose(result.rho, 0.5) and (result.origin == NONE).all() and above_one(rho, none) == 0
+
+
+def highlit_wall(strength):
+    """A brown wall with a round highlight that is predicted `strength` times as bright as it is."""
+    atlas = make_room([quad((0, 0, 0), (3, 0, 0), (0, 3, 0), 0)], 0.05).atlas
+    true, count = np.float32([0.2, 0.1, 0.05]), np.full(len(atlas), 9, np.int32)
+    distance = np.linalg.norm(atlas.position - (1.5, 1.5, 0), axis=1)
+    highlight = (0.25 * np.exp(-((distance / 0.4) ** 2)))[:, None].repeat(3, 1).astype(np.float32)
+    radiance = true + highlight * np.random.default_rng(0).normal(1, 0.03, (len(atlas), 1)).astype(np.float32)
+    tier, none = np.full(len(atlas), CLEAN, np.int8), np.zeros(len(atlas), np.float32)
+    lit = LitDiffuse(radiance, 0.05 * radiance, count, tier, none)
+    E = np.full((len(atlas), 3), np.pi, np.float32)
+
+    def recovered(without=()):
+        return albedo_of(atlas, lit, E, none, (), set(), strength * highlight, ("bias-field", *without))
+
+    return recovered, true, distance
+
+
+@pytest.mark.parametrize("strength", [0.8, 1.2])
+def test_a_highlight_that_is_predicted_wrongly_leaves_no_burn(strength):
+    recovered, true, distance = highlit_wall(strength)
+    middle, outside = distance < 0.3, distance > 1.2
+    plain, result = recovered({"specular-error"}), recovered()
+    off = [np.abs(one.rho[middle] / true - 1).mean() for one in (plain, result)]
+    assert off[0] > 0.3 and off[1] < off[0] / 3
+    assert np.allclose(result.rho[outside], true, rtol=0.01)
+    assert np.median(result.error[middle]) > 2 * np.median(result.error[outside])
+
+
+def test_nothing_taken_leaves_no_error():
+    lit = np.float32([[1, 1, 1], [NAN, NAN, NAN], [0, 0, 0]])
+    assert not specular_error(lit, 0.0).any() and not specular_error(lit, np.zeros((3, 3), np.float32)).any()
+    error = specular_error(lit, np.full((3, 3), 0.5, np.float32))
+    assert error[0] == pytest.approx(ALBEDO.specular_error) and np.isfinite(error).all() and error[2] > 1
+    assert not specular_error(lit, np.full((3, 3), NAN, np.float32)).any()
