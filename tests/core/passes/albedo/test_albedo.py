@@ -144,7 +144,7 @@ def test_a_highlight_that_is_predicted_wrongly_leaves_no_burn(strength):
     off = [np.abs(one.rho[middle] / true - 1).mean() for one in (plain, result)]
     assert off[0] > 0.3 and off[1] < off[0] / 3
     assert np.allclose(result.rho[outside], true, rtol=0.01)
-    assert np.median(result.error[middle]) > 1.3 * np.median(plain.error[middle])
+    assert off[1] < 3 * np.median(result.error[middle])  # and its error says how far it may be off
 
 
 def test_nothing_taken_leaves_no_error():
