@@ -87,23 +87,23 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    told = _told(problem, irradiance)
-    if told is None:
+    observations = _usable(problem, irradiance)
+    if observations is None:
         return None
-    usable, seen, E, element = told
-    light, log_I = problem.light, np.log(seen @ LUMINANCE)
+    usable, radiance, E, element = observations
+    light, log_I = problem.light, np.log(radiance @ LUMINANCE)
     widths = np.flatnonzero(light.grid <= FIT.broadest_phi)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted) about its median, (k,)."""
-        rest = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
-        return rest - np.median(rest)
+        log_ratio = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
+        return log_ratio - np.median(log_ratio)
 
     diffuse = residual(E @ LUMINANCE)
-    coats = (_one_colour(seen, E, _coat(problem, at)[usable]) for at in widths)
+    coats = (_one_colour(radiance, E, _coat(problem, at)[usable]) for at in widths)
     dielectric = min((residual(predicted @ LUMINANCE) for predicted in coats), key=spread)
     metals = [residual(light.A[usable, at] @ LUMINANCE) for at in widths]
-    best = int(np.argmin([spread(rest) for rest in metals]))
+    best = int(np.argmin([spread(log_ratio) for log_ratio in metals]))
     other, metal = min(diffuse, dielectric, key=spread), metals[best]
     return OneColour(
         spread(diffuse),
@@ -123,21 +123,21 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    told = _told(problem, irradiance)
-    if told is None:
+    observations = _usable(problem, irradiance)
+    if observations is None:
         return None
-    usable, seen, E, element = told
+    usable, radiance, E, element = observations
     widths = np.flatnonzero(problem.light.grid <= FIT.broadest_phi)
-    least = LEVELS.dark * np.median(seen)
+    floor = LEVELS.dark * np.median(radiance)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted), (k, 3); a factor common to all channels is free."""
-        rest = np.log(np.maximum(seen, least) / np.maximum(predicted, least))
-        return rest - np.median(rest.mean(1))
+        log_ratio = np.log(np.maximum(radiance, floor) / np.maximum(predicted, floor))
+        return log_ratio - np.median(log_ratio.mean(1))
 
-    diffuse = residual(_one_colour(seen, E, np.zeros(1, np.float32)))
-    coats = [residual(_one_colour(seen, E, _coat(problem, at)[usable])) for at in widths]
-    best = int(np.argmin([spread(rest) for rest in coats]))
+    diffuse = residual(_one_colour(radiance, E, np.zeros(1, np.float32)))
+    coats = [residual(_one_colour(radiance, E, _coat(problem, at)[usable])) for at in widths]
+    best = int(np.argmin([spread(log_ratio) for log_ratio in coats]))
     return Coated(
         spread(diffuse),
         spread(coats[best]),
@@ -146,8 +146,8 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     )
 
 
-def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
+def _usable(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Which observations are usable, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
     bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
     usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
     if usable.sum() < LEVELS.enough:
@@ -160,16 +160,16 @@ def _coat(problem: Problem, at: int) -> np.ndarray:
     return USUAL_F0 * problem.light.A[:, at] + problem.light.B[:, at]
 
 
-def _one_colour(seen: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:
+def _one_colour(radiance: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:
     """Radiance (k, 3) of the one albedo under a coat that suits most observations."""
-    rho = np.clip(np.median(np.pi * (seen - coat) / np.maximum(E, 1e-9), 0), 0, 1)
+    rho = np.clip(np.median(np.pi * (radiance - coat) / np.maximum(E, 1e-9), 0), 0, 1)
     return rho * E / np.pi + coat
 
 
-def _sigmas(one: np.ndarray, other: np.ndarray, element: np.ndarray) -> float:
-    """By how many standard errors over the elements residuals (k,) or (k, 3) of one kind are less than another's."""
-    most = LEVELS.sigmas * spread(other)
-    saved = np.minimum(np.abs(other), most) - np.minimum(np.abs(one), most)
+def _sigmas(residual: np.ndarray, reference: np.ndarray, element: np.ndarray) -> float:
+    """By how many standard errors over the elements `residual` ((k,) or (k, 3)) is smaller than `reference`."""
+    limit = LEVELS.sigmas * spread(reference)
+    saved = np.minimum(np.abs(reference), limit) - np.minimum(np.abs(residual), limit)
     _, group, count = np.unique(element, return_inverse=True, return_counts=True)
     by_element = np.bincount(group, saved.reshape(len(element), -1).mean(1)) / count
     error = by_element.std() / np.sqrt(len(by_element))

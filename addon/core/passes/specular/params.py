@@ -1,4 +1,4 @@
-"""What the choice of models and lobes is told; what each part gains: docs/ablation.md."""
+"""Parameters of the choice of models and lobes; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ class FitParams:
     views : int
         Views of each of the `LEVELS.of_object` elements that the fit looks at.
     part_elements : int
-        Elements of a part that its shape alone tells: it is a whole wall, with other things on it. Five phone-made
+        Elements of a part that is found by shape alone: it is a whole wall, with other things on it. Five phone-made
         rooms: models right on .66 of the pixels with 350, on .77 with 1050 (bathroom .47 to .90, office .74 to .88, a
         kitchen .54 to .52).
     looks_like_none : float
@@ -41,7 +41,7 @@ FIT = FitParams()
 
 @dataclass(frozen=True)
 class ChoiceParams:
-    """What it takes to believe in a lobe, or in a metal (`models`).
+    """When a lobe, or a metal, is accepted (`models`).
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ CHOICE = ChoiceParams()
 
 @dataclass(frozen=True)
 class LooksParams:
-    """What it takes to tell a metal or a coat by its looks (`metal-by-looks`, `coat-by-looks` in the ablation).
+    """When a metal or a coat is recognised by appearance (`metal-by-looks`, `coat-by-looks` in the ablation).
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ LOOKS = LooksParams()
 
 @dataclass(frozen=True)
 class GivenParams:
-    """Where an artist gives something of an object, or others of its class do.
+    """Of objects whose model is given by an artist, or by others of the class.
 
     Attributes
     ----------
