@@ -1,4 +1,4 @@
-"""What it takes to believe that something is transparent or cut out; what it gains: docs/ablation.md."""
+"""When an object is taken for transparent or cut out; what it gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 
