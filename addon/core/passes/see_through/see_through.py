@@ -99,7 +99,7 @@ def _well_inside(
 
 
 def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) -> SeeThrough | None:
-    """Whether what is behind explains an object's frames better than its own light; None if too few elements know it.
+    """Whether what is behind explains an object's frames better than its own light; None if known for too few elements.
 
     Parameters
     ----------
