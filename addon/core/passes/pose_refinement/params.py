@@ -26,11 +26,11 @@ class PoseParams:
     independent : float
         Share of the pixels whose errors are independent: neighbours share what the texture has wrong.
     stray : float
-        Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that
+        Times the median shift: a frame that would move farther has gone astray. It shows mirrors, or something that
         moved.
     worse : float
-        A frame goes back if it then fits this much worse. What it costs is mostly what the texture has wrong: without
-        any slack a third of two rooms' frames went back, most of them from better places.
+        A frame goes back if its cost becomes so many times what it was. Most of the cost is the texture's error:
+        without any slack a third of two rooms' frames went back, most of them from better places.
     sky : float
         Times the room's diagonal, where rays that escape are taken to end.
     """

@@ -41,7 +41,7 @@ class Calibration:
     response : (3, 256) float64
         Inverse camera response, as in `Radiometry`.
     gain : (f, 3) float64
-        Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame tells the unit.
+        Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame fixes the unit.
     falloff : (2,) float64
         Vignetting, as in `Radiometry`.
     calibrated : (f,) bool

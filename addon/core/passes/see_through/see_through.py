@@ -7,7 +7,7 @@ view as its background does:
     I(x, wo) = D + tau b(x, wo)        b: the light field behind the object, along the ray
 
 with one tau for the object (glass), or 0 or 1 for each element (cut out). D is free for each element, so a background
-of the object's own colour decides nothing. Half of each element's views choose, the other half judge.
+of the object's own colour decides nothing. One half of each element's views fits, the other half tests.
 """
 
 from dataclasses import dataclass
@@ -67,10 +67,10 @@ def look_behind(
         hits = scene.intersect(origin[active], onward[active])
         hit_element = field.elements(hits)
         same_object = (hit_element >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
-        through = np.flatnonzero(~same_object)
-        at = active[through]
-        radiance[at] = field.arriving(hits.part(through), hit_element[through], onward[at])
-        known[at] = np.where(hit_element[through] >= 0, seen[hit_element[through]], field.environment.seen)
+        exited = np.flatnonzero(~same_object)
+        at = active[exited]
+        radiance[at] = field.arriving(hits.part(exited), hit_element[exited], onward[at])
+        known[at] = np.where(hit_element[exited] >= 0, seen[hit_element[exited]], field.environment.seen)
         step = hits.distance[same_object] + 4 * scene.offset
         active = active[same_object]
         if not len(active):
@@ -131,7 +131,7 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
         costs["lobe"] += _cost(_centred(opaque[-1], train), test, scale)
         tau = _transmission(plain, background, train, scale)
         costs["glass"] += _cost(plain - tau * background, test, scale)
-        # A hole shows the background's changes in full; each element's first half of views says whether it is one.
+        # A hole shows the background's changes in full; each element's first half of views decides whether it is one.
         hole = _cost(plain - background, train, scale) < _cost(plain, train, scale)
         costs["holes"] += _cost(plain - hole * background, test, scale)
         transmissions.append(tau)

@@ -48,7 +48,7 @@ def sharpened(
     read : callable
         Gives a frame's pixels.
     lookup : callable, optional
-        As `ElementLookup` finds elements, but -1 where the atlas has none; that one over all of it where left out.
+        As `ElementLookup` finds elements, but -1 where the atlas has none; by default `surface.lookup`.
     **options
         As `accumulate` takes it: median, order, seed, threads, folder, groups, progress.
 

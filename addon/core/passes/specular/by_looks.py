@@ -22,13 +22,13 @@ from .params import LOOKS
 def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice:
     """An object's choice, METAL where one metal explains all of its surface and neither diffuse nor dielectric does.
 
-    For small and thin objects: `problem` may hold elements of a single view. They are taken to be of one
-    colour; where they are not, texture widens all spreads and the choice stays.
+    For small and thin objects: `problem` may hold elements of a single view. They are taken to be of one colour; where
+    they are not, texture widens all spreads and the choice stays.
     """
     if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio:
         return choice
-    # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None reflects more
-    # than it receives, but for the light's error: a white bowl under a lamp had 2.1.
+    # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None reflects more than it
+    # receives, but for the light's error: a white bowl under a lamp had 2.1.
     if not MOST_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
     fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.metal, looks.diffuse)

@@ -42,9 +42,9 @@ class Choice:
     note: str = ""
     scores: dict[str, float] = field(default_factory=dict)
     dielectric: LobeFit | None = None
-    """A dielectric's sure lobe that serves nearly as well as the metal's that was taken."""
+    """A dielectric's significant lobe that fits nearly as well as the metal's that was taken."""
     metal: LobeFit | None = None
-    """A metal's lobe that serves better than any other model, but not beyond doubt."""
+    """A metal's lobe that fits better than any other model, but not significantly."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
     looks: OneColour | Coated | None = None
@@ -79,12 +79,12 @@ def _weighted(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
 
 
 def _is_dielectric(fit: LobeFit) -> bool:
-    """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
+    """Whether a dielectric can have this lobe, and it can be distinguished from a diffuse part."""
     return fit.psi[0] <= MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
 def _is_metallic(fit: LobeFit) -> bool:
-    """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
+    """Whether this lobe is too strong for a dielectric, and can be distinguished from a diffuse part."""
     return float(fit.psi.mean()) > MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
@@ -131,8 +131,8 @@ def _own_or_class_lobe(own_lobe: LobeFit, class_lobe: LobeFit, model: Brdf, prob
 def choose_model(problem: Problem, part: bool = False) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements.
 
-    A `part` that shape alone tells may hold other things without a highlight: its lobe need only be likely, however
-    little it gains. It is never called metal, which would take the texture of all of them.
+    A `part` that is found by shape alone may hold other objects without a highlight: its lobe need only be likely,
+    however little it gains. It is never called metal, which would take the texture of all of them.
     """
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
@@ -140,7 +140,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     odd = (np.random.default_rng(0).permutation(dense.there.shape[1]) % 2).astype(bool)
 
     def held_out(fit: LobeFit, model: Brdf) -> tuple[np.ndarray, np.ndarray]:
-        """Costs of the elements with the lobe that the others gave, and without one."""
+        """Costs of the elements with the lobe fitted to the others, and without one."""
         halves = [held_out_costs(dense, fit, train, scale, model.constraints) for train in (odd, ~odd)]
         with_lobe, without = (np.concatenate(costs) for costs in zip(*halves, strict=True))
         return with_lobe, without
@@ -159,7 +159,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     if not part and _is_metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
-        # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
+        # A broad lobe of a dielectric can look like a weak metal's: it must be distinguished from that, too.
         (metal_gain, metal_sigmas), (gain_over_dielectric, sigmas_over_dielectric) = (
             _gain(with_metal, diffuse),
             _gain(with_metal, with_lobe),
@@ -193,22 +193,22 @@ def set_apart(choice: Choice, see_through: SeeThrough, sure: bool) -> Choice:
 def adopt_from_class(
     choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
 ) -> dict[int, Choice]:
-    """One lobe for each class of objects, unless an object's own frames speak against it.
+    """One lobe for each class of objects, unless an object's own frames contradict it.
 
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
-    model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
-    whose own frames decide nothing take over the class's if all members' frames together are sure of a lobe, but not
-    where it raises their cost by more than `excluded`.
-    Transparent objects neither give nor take. Among metals, one whose frames favour metal without being sure of it is
-    one, as rough as the others unless its frames are sure of something else. Among dielectrics, one that is a metal no
-    more surely than it is one of them is one of them.
+    model, weighted by evidence. Members keep their own lobe where it fits significantly better than that. Objects whose
+    own frames decide nothing adopt the class's if the frames of all members together are sure of a lobe, but not where
+    it raises their cost by more than `LEVELS.gain`.
+    Transparent objects neither give nor take. In a class of metals, a member whose frames favour metal, but not
+    significantly, becomes one, as rough as the others unless its frames are sure of something else. In a class of
+    dielectrics, a metal that a dielectric's lobe fits nearly as well becomes a dielectric.
     """
     result, choices = dict(choices), {i: choice for i, choice in choices.items() if not choice.model.see_through}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
         members = {i: choice for i, choice in choices.items() if class_of[i] == name}
         if not any(choice.model.has_lobe for choice in members.values()):
-            together = _together(members)
-            members, result = members | together, result | together
+            joint = _jointly_glossy(members)
+            members, result = members | joint, result | joint
         glossy = {i: choice for i, choice in members.items() if choice.model.has_lobe}
         if not glossy:
             continue
@@ -218,7 +218,7 @@ def adopt_from_class(
         }
         source = max(sorted(clear) or judges, key=lambda i: glossy[i].sigmas)
         shared = _pooled([c for c in judges.values() if c.model is glossy[source].model], glossy[source])
-        agreed = not shared.model.layered or _agreed(members)
+        agreed = not shared.model.layered or _jointly_significant(members)
         for i, choice in members.items():
             may_become_metal = shared.model.lobe_alone and not choice.model.lobe_alone
             if may_become_metal and choice.metal is not None:
@@ -229,25 +229,25 @@ def adopt_from_class(
                 note = "Like a metal, but not beyond doubt; others of its class are not."
                 fit = _own_or_class_lobe(choice.dielectric, shared.lobe, shared.model, problems.get(i))
                 result[i] = replace(choice, model=shared.model, fit=fit, note=note)
-            elif not choice.model.has_lobe and agreed and not _refused(shared.lobe, choice.fit, problems.get(i)):
+            elif not choice.model.has_lobe and agreed and not _contradicted(shared.lobe, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(shared, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model is shared.model and len(glossy) > 1 and i in problems:
-                # By looks alone it has no lobe of its own, where views of others tell one.
+                # A lobe by appearance alone gives way to the class's, where views of others determine that.
                 own_problem = None if choice.looks is not None and shared.looks is None else problems[i]
                 result[i] = replace(choice, fit=_own_or_class_lobe(choice.lobe, shared.lobe, shared.model, own_problem))
     return result
 
 
-def _together(members: dict[int, Choice]) -> dict[int, Choice]:
-    """The members of a class that each gain by a lobe, as specular, if they are sure enough of it together.
+def _jointly_glossy(members: dict[int, Choice]) -> dict[int, Choice]:
+    """The members of a class that each gain by a lobe, as dielectrics, if that is significant for all together.
 
     None of them is by itself; all that have any evidence count, also those that speak against a lobe. One that gains by
     what is no dielectric's lobe (diffuse curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for
     none.
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
-    if len(judged) < 2 or not _agreed(members):
+    if len(judged) < 2 or not _jointly_significant(members):
         return {}
     return {
         i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
@@ -256,8 +256,8 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     }
 
 
-def _agreed(members: dict[int, Choice]) -> bool:
-    """Whether the frames of a class's members together are sure of a dielectric's lobe (Stouffer's sum of z-scores)."""
+def _jointly_significant(members: dict[int, Choice]) -> bool:
+    """Whether a class's members together have a significant dielectric lobe (Stouffer's combined z-score)."""
     judged = [choice for choice in members.values() if choice.fit is not None]
     counted = [c.sigmas if c.model.has_lobe or _is_dielectric(c.lobe) else min(c.sigmas, 0) for c in judged]
     return bool(judged) and sum(counted) / np.sqrt(len(judged)) > LEVELS.sigmas
@@ -266,7 +266,7 @@ def _agreed(members: dict[int, Choice]) -> bool:
 def _pooled(choices: list[Choice], best: Choice) -> Choice:
     """`best` with the median phi and psi of several choices, weighted by their evidence.
 
-    Of those that views speak for, if any: by looks alone lobes come out too broad (spot rings' roughness .7 for .2).
+    Of those that views determine, if any: by appearance alone lobes are too broad (spot rings' roughness .7 for .2).
     """
     choices = [choice for choice in choices if choice.looks is None] or choices
     weight = np.square([choice.sigmas for choice in choices])
@@ -275,7 +275,7 @@ def _pooled(choices: list[Choice], best: Choice) -> Choice:
     return replace(best, fit=replace(best.lobe, phi=phi, psi=np.array(psi)))
 
 
-def _refused(lobe: LobeFit, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
+def _contradicted(lobe: LobeFit, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
     """Whether an object's own frames contradict its class's lobe."""
     if problem is None or len(np.unique(problem.element)) < LEVELS.few:
         return False

@@ -1,13 +1,13 @@
 """Whether an object looks like a metal or coated all over: diffuse, dielectric and metal compared, each of one colour.
 
-`models` asks what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
+`models` fits what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
 rings) leave it little: few views of few elements, on a mesh coarser than what they mirror. But a metal shows the room,
 and everything diffuse the light that arrives: over a whole object of one colour the radiance follows one or the other.
 What is compared is the robust spread of log(I / prediction) over all observations; a factor common to all is free, so
-none of the three has to know its colour. Texture widens all three spreads alike, and so speaks for none.
+none of the three has to know its colour. Texture widens all three spreads alike, and so favours none.
 
-A coat of no colour of its own over a saturated one shows in the dark channels, too: diffuse and dielectric are compared
-by channel (`compare_coat`).
+An uncoloured coat over a saturated base shows in the dark channels, too: diffuse and dielectric are compared by channel
+(`compare_coat`).
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from .params import FIT
 
 @dataclass(frozen=True)
 class OneColour:
-    """How well each kind of matter of one colour explains an object's frames.
+    """How well each model, of one colour, explains an object's frames.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class OneColour:
 
     @property
     def ratio(self) -> float:
-        """The metal's spread over that; below 1 speaks for metal."""
+        """The metal's spread over that; below 1 favours metal."""
         return self.metal / self.other
 
 
@@ -74,7 +74,7 @@ class Coated:
 
     @property
     def ratio(self) -> float:
-        """The coated spread over the diffuse one; below 1 speaks for a coat."""
+        """The coated spread over the diffuse one; below 1 favours a coat."""
         return self.coated / self.diffuse
 
 

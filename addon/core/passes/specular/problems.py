@@ -60,7 +60,7 @@ class Problems:
         self._field, self._samples = field, samples
         self._threads, self._seed, self._without = threads, seed, without
         self._bright = bright_triangles(field)
-        # A clipped pixel is no value; what is left is sorted by object, so that each object's lies together.
+        # A clipped pixel is no value; the others are sorted by object, so that each object's lies together.
         usable = np.flatnonzero(~samples.saturated)
         owner = field.atlas.object_id[samples.element[usable]]
         order = np.argsort(owner, kind="stable")
@@ -81,7 +81,7 @@ class Problems:
         ----------
         smooth : bool
             Those alone in whose pixels the surface turns by less than a crease does, or the flattest quarter: over a
-            crease a pixel shows two lobes, which no wider one stands for.
+            crease a pixel shows two lobes, which no wider one approximates.
         """
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         index = self._usable[first:last]

@@ -6,8 +6,8 @@ between samples, left such windows white there, and what lies beside them burnt.
 
 I_nd is predicted over whole pictures, by few rays in each pixel; pixels nearby on the same object share theirs. Of a
 large picture one pixel in each cell is traced: no lobe has finer detail for being seen by more pixels. Where I_nd is
-more than what is left, the pixel is taken for a bound, as a clipped one is: it counts where there is no other, and what
-rests on such pixels alone is not measured.
+more than the remainder, the pixel is taken for a bound, as a clipped one is: it counts where there is no other, and
+what rests on such pixels alone is not measured.
 """
 
 import zlib
@@ -91,10 +91,10 @@ class SpecularPart:
                 field, self._bright, element[pixels[traced]], -rays[:, pixels[traced]].T, *self._lobes[object_id],
                 rays=self._rays, seed=self._seed + seed + object_id,
             )  # fmt: skip
-            result[pixels] = self._shared(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
+            result[pixels] = self._smoothed(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
         return result.reshape(*view.triangle.shape, 3)
 
-    def _shared(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
+    def _smoothed(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
         """The mean of an object's cells nearby, of one ray's place each, at places ((2, k), in cells): (k, 3) float32.
 
         Parameters
@@ -112,11 +112,11 @@ class SpecularPart:
         reach = REMOVAL.reach
         total = gaussian_filter(planes, reach / 2, axes=(1, 2), mode="constant", radius=reach)
         if place is None:
-            shares = total[:, row, column]
+            sums = total[:, row, column]
         else:
             at = place - low[:, None]
-            shares = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
-        return (shares[:3] / shares[3]).T
+            sums = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
+        return (sums[:3] / sums[3]).T
 
 
 def one_of_each_cell(place: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
