@@ -218,7 +218,7 @@ def _by_looks(
             coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
             if coat is None or coat.ratio > 1:
                 return choice, problem
-    index = maker.pick(object_id, LEVELS.of_object, LEVELS.views, least=1, seed=1)
+    index = maker.pick(object_id, LEVELS.of_object, LEVELS.views, min_views=1, seed=1)
     if not len(index):
         return choice, problem
     full_problem = maker.problem(index, room.settings.specular_rays)

@@ -19,7 +19,7 @@ from ..light.sun import Sun, extract_sun
 from ..luminance import LUMINANCE
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
-from ..passes.clipped_lamps.patches import clipped_patches, told_of
+from ..passes.clipped_lamps.patches import clipped_patches, measured_patches
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
@@ -289,7 +289,7 @@ def with_missing_light(
     good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
     if not is_missing(field, good, seed):
         return field, light, np.zeros(len(field.atlas), bool)
-    measured = told_of(patches, field.atlas, lit_diffuse)
+    measured = measured_patches(patches, field.atlas, lit_diffuse)
     bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
     reflecting = dark.with_mirrors(field.mirrors)
     unknown, reliable = [patch for patch in patches if patch not in measured], good & ~bright

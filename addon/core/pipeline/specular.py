@@ -303,7 +303,7 @@ def _without_background(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
     elements = field.atlas.elements_of(material.object_id)
-    index = maker.pick(material.object_id, LEVELS.sample, FIT.views, least=1, seed=2)
+    index = maker.pick(material.object_id, LEVELS.sample, FIT.views, min_views=1, seed=2)
     if not len(index):
         return elements, np.zeros((len(elements), 3), np.float32)
     behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)

@@ -112,7 +112,7 @@ def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
     return luminance > PATCHES.bright * weighted_median(luminance[lit.seen], atlas.area[lit.seen])
 
 
-def told_of(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
+def measured_patches(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
     """The patches whose radiance was measured: most of what frames saw of them is not clipped."""
     seen_of = {patch: lit.seen & (atlas.object_id == patch) for patch in patches}
     return [patch for patch, seen in seen_of.items() if np.median(lit.clipped[seen]) <= 0.5]

@@ -1,1 +1,1 @@
-"""Puts frames right that lie beside what all of them show together."""
+"""Corrects the poses of frames that are misaligned with the texture of all of them."""

@@ -16,21 +16,21 @@ class PoseParams:
     samples : int
         Rays along an edge of each of these pixels, so that the texture's edges are as soft as the picture's.
     least_gradient : float
-        Of log radiance over a pixel; less tells of no shift.
+        Of log radiance over a pixel; less says nothing of a shift.
     floor : float
-        Share of the room's median radiance that is added before the logarithm: noise in the dark says nothing.
+        Share of the room's median radiance that is added before the logarithm: noise in the dark must not count.
     rounds : int
         All frames are refined so often, each against the others as last refined.
     least_spread : float
-        Of the logarithm: a picture of flat colours fits to the last bit but at its edges, all that there is to go by.
+        Of the logarithm: a picture of flat colours fits to the last bit but at its edges, which alone are informative.
     independent : float
-        Share of the pixels that err on their own: neighbours share what the texture has wrong.
+        Share of the pixels whose errors are independent: neighbours share what the texture has wrong.
     stray : float
-        Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that
+        Times the median shift: a frame that would move farther has gone astray. It shows mirrors, or something that
         moved.
     worse : float
-        A frame goes back if it then fits this much worse. What it costs is mostly what the texture has wrong: without
-        any slack a third of two rooms' frames went back, most of them from better places.
+        A frame goes back if its cost becomes so many times what it was. Most of the cost is the texture's error:
+        without any slack a third of two rooms' frames went back, most of them from better places.
     sky : float
         Times the room's diagonal, where rays that escape are taken to end.
     """

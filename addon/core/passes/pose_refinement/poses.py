@@ -1,11 +1,11 @@
-"""Poses put right by what all frames show together.
+"""Pose refinement by aligning each frame with the texture of all frames.
 
 Each frame is compared with L_d, the room's texture, which is the median of all of them: where a picture's gradients
-say that it lies beside the texture, its camera is moved and turned (Lucas and Kanade 1981 for six degrees of freedom;
+show it misaligned with the texture, its camera is moved and turned (Lucas and Kanade 1981 for six degrees of freedom;
 Zhou and Koltun 2014, "Color Map Optimization", in turn with the texture as there). The mesh stays where it is, so the
 frames come to agree with it, not only with each other.
 
-First a few frames are asked. If they lie where they should, as in a capture whose poses are good, nothing is done.
+First a few frames are tested. If they are aligned, as in a capture whose poses are good, nothing is done.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ...light.field import LightField
 
 ROTATION = np.radians(1.0)
-"""Standard deviation of a rotation that is expected of poses of which nothing is known."""
+"""Standard deviation of the rotation error that is expected of unknown poses."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class Poses:
     ----------
     camera_to_world : (f, 4, 4) float64
     shift : () float
-        Pixels by which frames lay beside the texture, median over those that were asked; NaN where none could tell.
+        Pixels by which frames are misaligned with the texture, median over those tested; NaN if none is usable.
     moved : (f,) bool
-        Whether a frame's pose was put right.
+        Whether a frame's pose was corrected.
     """
 
     camera_to_world: np.ndarray
@@ -55,7 +55,7 @@ class Poses:
 
     @classmethod
     def as_read(cls, frames: Sequence[Frame], shift: float = float("nan")) -> Poses:
-        """Those that the capture tells."""
+        """Those of the capture."""
         poses = np.reshape([frame.camera.camera_to_world for frame in frames], (-1, 4, 4)).astype(np.float64)
         return cls(poses, np.array(shift), np.zeros(len(frames), bool))
 
@@ -85,7 +85,7 @@ class Texture:
         """Radiance that is added before the logarithm."""
         return max(POSES.floor * float(np.median(self.field.radiance[self.seen])), 1e-30)
 
-    def shown(self, camera: Camera, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def render(self, camera: Camera, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a camera sees in pixels of columns `x` and rows `y` ((m,) int).
 
         Returns
@@ -105,12 +105,12 @@ class Texture:
                 [x + (part % POSES.samples + 0.5) / POSES.samples, y + (part // POSES.samples + 0.5) / POSES.samples],
                 -1,
             )
-            directions, led = camera.rays(at)
+            directions, valid = camera.rays(at)
             hits = self.field.scene.intersect(origins, directions)
             element = self.field.elements(hits)
             radiance += self.field.arriving(hits, element, directions)
             distance = np.minimum(distance, hits.distance)
-            known &= led & ((element < 0) | self.seen[element])
+            known &= valid & ((element < 0) | self.seen[element])
         return radiance / POSES.samples**2, distance, known
 
 
@@ -120,34 +120,34 @@ class Step:
 
     Attributes
     ----------
-    way : (6,) float
+    motion : (6,) float
         Rotation vector in radians and metres, in the camera's axes.
     shift : float
-        Pixels of the small picture by which that moves what it shows, root mean square over the pixels asked.
+        Pixels of the small picture by which that moves what it shows, root mean square over the pixels used.
     cost : float
         How badly the frame fits where it is: mean of its residuals' sizes, large ones cut off, pixels weighted by
         their gradients.
     """
 
-    way: np.ndarray
+    motion: np.ndarray
     shift: float
     cost: float
 
 
-def moved(camera: Camera, way: np.ndarray) -> Camera:
+def moved(camera: Camera, motion: np.ndarray) -> Camera:
     """The camera turned by a rotation vector and moved ((6,): radians, metres) in its own axes."""
     pose = camera.camera_to_world.copy()
-    pose[:3, 3] += pose[:3, :3] @ way[3:]
-    pose[:3, :3] = pose[:3, :3] @ Rotation.from_rotvec(way[:3]).as_matrix()
+    pose[:3, 3] += pose[:3, :3] @ motion[3:]
+    pose[:3, :3] = pose[:3, :3] @ Rotation.from_rotvec(motion[:3]).as_matrix()
     return replace(camera, camera_to_world=pose)
 
 
 def _flow(camera: Camera, points: np.ndarray) -> np.ndarray:
-    """How points ((m, 3) world) move in the picture with the camera's six ways, (m, 2, 6) pixels per radian, metre."""
-    here, _ = camera.project(points)
-    small = 1e-5
-    ways = small * np.eye(6)
-    return np.stack([(moved(camera, way).project(points)[0] - here) / small for way in ways], -1)
+    """Derivative of points' pixels ((m, 3) world) by the camera's motion, (m, 2, 6) in pixels per radian, metre."""
+    projected, _ = camera.project(points)
+    epsilon = 1e-5
+    motions = epsilon * np.eye(6)
+    return np.stack([(moved(camera, motion).project(points)[0] - projected) / epsilon for motion in motions], -1)
 
 
 def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = ROTATION) -> Step | None:
@@ -159,7 +159,7 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = 
         Of this very picture.
     rotation : float
         Radians about each axis, the standard deviation that is expected; and of the place what moves the picture as
-        much. Turning and moving look nearly alike: what the picture does not tell apart stays as it is.
+        much. Turning and moving look nearly alike: what the picture does not distinguish stays as it is.
     """
     floor = texture.floor
     picture = np.log(np.maximum(pixels.radiance, 0) + floor).mean(-1).astype(np.float64)
@@ -168,48 +168,52 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = 
     inner[SMALL.off : -SMALL.off, SMALL.off : -SMALL.off] = True
     good &= inner
     dx, dy = (gaussian_filter(picture, SMALL.blur, order=order) for order in ((0, 1), (1, 0)))
-    steep = np.where(good, np.hypot(dx, dy), 0)
-    count = min(LEVELS.sample, steep.size - 1)
-    least = max(float(np.partition(steep.ravel(), -count)[-count]), POSES.least_gradient)
-    y, x = np.nonzero(steep >= least)
+    gradient = np.where(good, np.hypot(dx, dy), 0)
+    count = min(LEVELS.sample, gradient.size - 1)
+    threshold = max(float(np.partition(gradient.ravel(), -count)[-count]), POSES.least_gradient)
+    y, x = np.nonzero(gradient >= threshold)
     if len(x) < LEVELS.many:
         return None
-    radiance, distance, known = texture.shown(camera, x, y)
+    radiance, distance, known = texture.render(camera, x, y)
     x, y = x[known], y[known]
     if len(x) < LEVELS.many:
         return None
     residual = picture[y, x] - np.log(np.maximum(radiance[known], 0) + floor).mean(-1)
     directions = camera.directions(np.stack([x + 0.5, y + 0.5], -1)).astype(np.float64)
     flow = _flow(camera, camera.centre + distance[known, None] * directions)
-    # The texture's image T moves with the camera: T - gradient . flow way + gain = picture.
-    change = -(dx[y, x, None] * flow[:, 0] + dy[y, x, None] * flow[:, 1])
-    telling = steep[y, x] ** 2
-    # What frames show of the sky tells no distance.
-    far = min(float(np.median(distance[known])), texture.field.scene.diagonal)
-    expected = rotation * np.r_[np.ones(3), np.full(3, far)]
-    way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling, expected)
-    shift = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
-    left = np.abs(residual - weighted_median(residual, telling))
-    return Step(way, shift, float(np.average(np.minimum(left, LEVELS.outlier * POSES.least_spread), weights=telling)))
+    # The texture's image T moves with the camera: T - gradient . flow motion + gain = picture.
+    jacobian = -(dx[y, x, None] * flow[:, 0] + dy[y, x, None] * flow[:, 1])
+    gradient_weight = gradient[y, x] ** 2
+    # The sky has no distance.
+    depth = min(float(np.median(distance[known])), texture.field.scene.diagonal)
+    expected = rotation * np.r_[np.ones(3), np.full(3, depth)]
+    motion = _fit(np.column_stack([jacobian, np.ones(len(x))]), residual, gradient_weight, expected)
+    shift = float(np.sqrt(((flow @ motion) ** 2).sum(1).mean()))
+    deviation = np.abs(residual - weighted_median(residual, gradient_weight))
+    return Step(
+        motion,
+        shift,
+        float(np.average(np.minimum(deviation, LEVELS.outlier * POSES.least_spread), weights=gradient_weight)),
+    )
 
 
-def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """The six ways, (6,), by robust least squares under a prior; the last column of `change` is a gain's.
+def _fit(jacobian: np.ndarray, residual: np.ndarray, gradient_weight: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """The motion, (6,), by robust least squares under a prior; the last column of `jacobian` is a gain's.
 
     `expected` ((6,)) are the prior's standard deviations.
 
-    `telling` ((m,)) weighs the pixels where it is told how large residuals usually are: where the picture is flat they
+    `gradient_weight` ((m,)) weighs the pixels in the estimate of the residuals' spread: where the picture is flat they
     are small wherever the camera is, and would make those at edges look like outliers.
     """
     prior = np.diag(np.r_[expected**-2, 0])
-    way = np.zeros(7)
+    solution = np.zeros(7)
     for _ in range(LEVELS.reweighted):
-        left = residual - change @ way
-        spread = max(SIGMA_OF_MAD * weighted_median(np.abs(left), telling), POSES.least_spread)
-        weight = POSES.independent / spread**2 / (1 + (left / (LEVELS.outlier * spread)) ** 2)
-        weighted = change * weight[:, None]
-        way = np.linalg.solve(weighted.T @ change + prior, weighted.T @ residual)
-    return way[:6]
+        remainder = residual - jacobian @ solution
+        spread = max(SIGMA_OF_MAD * weighted_median(np.abs(remainder), gradient_weight), POSES.least_spread)
+        weight = POSES.independent / spread**2 / (1 + (remainder / (LEVELS.outlier * spread)) ** 2)
+        weighted = jacobian * weight[:, None]
+        solution = np.linalg.solve(weighted.T @ jacobian + prior, weighted.T @ residual)
+    return solution[:6]
 
 
 def refine_poses(
@@ -220,7 +224,7 @@ def refine_poses(
     threads: int = 0,
     progress: Progress | Rounds | None = None,
 ) -> Poses:
-    """Put the frames where they fit the texture.
+    """Align the frames with the texture.
 
     Parameters
     ----------
@@ -241,31 +245,33 @@ def refine_poses(
         From `progress`.
     """
 
-    def look(item: tuple[Frame, Camera], shift: float = np.inf) -> Step | None:
+    def compare(item: tuple[Frame, Camera], shift: float = np.inf) -> Step | None:
         frame, camera = item
         step = -(-camera.width // SMALL.width)
         small = camera.coarser(step)
         return step_of(small, read(frame).coarser(step), texture, min(shift * small.pixel_angle, ROTATION))
 
-    asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]
-    each = bytes_of_frame(frame.camera for frame in frames)
-    first = ordered_map(look, [(frame, frame.camera) for frame in asked], threads, each=each)
-    found = [step for step in first if step]
-    shift = float(np.median([step.shift for step in found])) if found else float("nan")
+    sample = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]
+    frame_bytes = bytes_of_frame(frame.camera for frame in frames)
+    first_steps = ordered_map(compare, [(frame, frame.camera) for frame in sample], threads, each=frame_bytes)
+    valid_steps = [step for step in first_steps if step]
+    shift = float(np.median([step.shift for step in valid_steps])) if valid_steps else float("nan")
     if not shift >= POSES.least_shift:
         return Poses.as_read(frames, shift)
     cameras = [frame.camera for frame in frames]
     cost, farthest = np.full(len(frames), np.inf), min(MISALIGNMENT.largest, POSES.stray * shift)
     moves = np.ones(len(frames), bool)
-    for turn in range(POSES.rounds):
+    for iteration in range(POSES.rounds):
         todo = np.flatnonzero(moves)
-        # Frames are off by as much as those that were asked: what one needs is expected of all.
-        steps = ordered_map(lambda item: look(item, shift), [(frames[i], cameras[i]) for i in todo], threads, each=each)
+        # Frames are off by as much as those that were tested: what one needs is expected of all.
+        steps = ordered_map(
+            lambda item: compare(item, shift), [(frames[i], cameras[i]) for i in todo], threads, each=frame_bytes
+        )
         for done, (i, step) in enumerate(zip(todo, steps, strict=True), 1):
             if progress is not None:
-                progress.update((turn + done / len(todo)) / POSES.rounds)
+                progress.update((iteration + done / len(todo)) / POSES.rounds)
             if step is None or step.shift > farthest or step.cost > POSES.worse * cost[i]:
                 cameras[i], moves[i] = frames[i].camera, False
             else:
-                cameras[i], cost[i] = moved(cameras[i], step.way), step.cost
+                cameras[i], cost[i] = moved(cameras[i], step.motion), step.cost
     return Poses(np.stack([camera.camera_to_world for camera in cameras]), np.array(shift), moves)

@@ -34,14 +34,14 @@ from .white_balance import mean_white_balance
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the frames' codes mean.
+    """Response, gains and vignetting of the frames.
 
     Attributes
     ----------
     response : (3, 256) float64
         Inverse camera response, as in `Radiometry`.
     gain : (f, 3) float64
-        Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame tells the unit.
+        Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame fixes the unit.
     falloff : (2,) float64
         Vignetting, as in `Radiometry`.
     calibrated : (f,) bool
@@ -63,7 +63,7 @@ class Calibration:
         return cls(response, np.ones((frames, 3)), np.zeros(2), np.zeros(frames, bool), np.array(np.nan))
 
     def of(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
-        """The frames with what was found of them."""
+        """The frames with their radiometry."""
         return tuple(
             replace(frame, radiometry=Radiometry(self.response, gain, self.falloff)) if known else frame
             for frame, gain, known in zip(frames, self.gain, self.calibrated, strict=True)
@@ -81,94 +81,98 @@ def calibrate(
     white_balance: bool = True,
     progress: Progress | Rounds | None = None,
 ) -> Calibration:
-    """Calibrate frames whose curve nobody told (`Frame.uncalibrated`); the others are left alone.
+    """Calibrate frames of unknown response (`Frame.uncalibrated`); the others are left alone.
 
     Parameters
     ----------
     read : callable
         A frame's codes as "radiance", 0...1.
     white_balance : bool
-        Whether to look for the white balance that all frames have in common.
+        Whether to estimate the white balance that all frames have in common.
 
     Raises
     ------
     InterruptedRun
         From `progress`.
     """
-    asked = np.array([frame.uncalibrated for frame in frames], bool)
-    nothing = Calibration.none(len(frames))
-    if asked.sum() < VISIBILITY.enough:
-        return nothing
-    own = [frame for frame, wanted in zip(frames, asked) if wanted]
-    found = observe_codes(mesh, scene, own, read, threads=threads, seed=seed, progress=progress)
-    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= VISIBILITY.enough)
-    stated = np.log([frame.exposure for frame in own])
-    if len(found.point) < CALIBRATION.points:
-        return nothing
-    response, gain, falloff, spread = solve(found, len(own), stated)
+    uncalibrated = np.array([frame.uncalibrated for frame in frames], bool)
+    default = Calibration.none(len(frames))
+    if uncalibrated.sum() < VISIBILITY.enough:
+        return default
+    selected = [frame for frame, wanted in zip(frames, uncalibrated) if wanted]
+    observations = observe_codes(mesh, scene, selected, read, threads=threads, seed=seed, progress=progress)
+    observations = observations.part(
+        np.bincount(observations.point, minlength=1)[observations.point] >= VISIBILITY.enough
+    )
+    stated = np.log([frame.exposure for frame in selected])
+    if len(observations.point) < CALIBRATION.points:
+        return default
+    response, gain, falloff, spread = solve(observations, len(selected), stated)
     if white_balance:
-        mean = np.einsum("fck,ck->fc", found.histogram, response)
-        told = (np.bincount(found.frame, minlength=len(own)) > 0) & (mean > 0).all(1)
-        gain = gain * np.exp(mean_white_balance(np.log(gain), np.log(np.maximum(mean, 1e-6)), told))
-    gains = nothing.gain.copy()
-    gains[asked] = gain
-    return Calibration(response, gains, falloff, asked, np.array(spread))
+        mean = np.einsum("fck,ck->fc", observations.histogram, response)
+        known = (np.bincount(observations.frame, minlength=len(selected)) > 0) & (mean > 0).all(1)
+        gain = gain * np.exp(mean_white_balance(np.log(gain), np.log(np.maximum(mean, 1e-6)), known))
+    gains = default.gain.copy()
+    gains[uncalibrated] = gain
+    return Calibration(response, gains, falloff, uncalibrated, np.array(spread))
 
 
-def solve(seen: CodeObservations, frames: int, stated: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def solve(
+    observations: CodeObservations, frames: int, stated: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Response, gains, falloff and the residuals' spread, as in `Calibration`, of observations of some frames.
 
     Parameters
     ----------
     stated : (f,) float
-        Logarithm of the exposures that somebody stated; the same where nobody did.
+        Logarithm of the stated exposures; all the same where none are stated.
     """
-    point = np.unique(seen.point, return_inverse=True)[1]
+    point = np.unique(observations.point, return_inverse=True)[1]
     rows, places, k = len(point), int(point.max()) + 1, CALIBRATION.splines
-    prior = _log_srgb(seen.code)
+    prior = _log_srgb(observations.code)
     member = sparse.csr_matrix((np.ones(rows), (point, np.arange(rows))), shape=(places, rows))
-    of_frame = sparse.csr_matrix((np.ones(rows), (np.arange(rows), seen.frame)), shape=(rows, frames))
-    falloff = sparse.csr_matrix(np.stack([seen.r2, seen.r2**2], 1))
+    of_frame = sparse.csr_matrix((np.ones(rows), (np.arange(rows), observations.frame)), shape=(rows, frames))
+    falloff = sparse.csr_matrix(np.stack([observations.r2, observations.r2**2], 1))
     # Unknowns: for each channel the splines and the gains, then the falloff for all.
-    designs = [sparse.hstack([-_splines(seen.code[:, c], k), of_frame, falloff]).tocsr() for c in range(3)]
-    own = k + frames
-    index = [np.r_[c * own : (c + 1) * own, 3 * own, 3 * own + 1] for c in range(3)]
-    penalties = [_penalty(seen.code[:, c], frames) for c in range(3)]
+    designs = [sparse.hstack([-_splines(observations.code[:, c], k), of_frame, falloff]).tocsr() for c in range(3)]
+    block = k + frames
+    index = [np.r_[c * block : (c + 1) * block, 3 * block, 3 * block + 1] for c in range(3)]
+    penalties = [_penalty(observations.code[:, c], frames) for c in range(3)]
     # A code's noise counts by the slope of the logarithm.
     slope = np.gradient(_log_srgb(CODES), CODES)
-    deviation = np.hypot(CALIBRATION.texture, CALIBRATION.noise * np.interp(seen.code, CODES, slope))
+    deviation = np.hypot(CALIBRATION.texture, CALIBRATION.noise * np.interp(observations.code, CODES, slope))
     weight = deviation**-2 * np.median(deviation) ** 2
-    x = np.zeros(3 * own + 2)
+    x = np.zeros(3 * block + 2)
     residual = np.zeros((rows, 3))
     for _ in range(LEVELS.reweighted):
-        normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
+        normal, rhs = np.zeros((len(x), len(x))), np.zeros(len(x))
         for c, (design, at) in enumerate(zip(designs, index)):
             w = weight[:, c]
             summed = np.maximum(np.bincount(point, w, places), 1e-12)
             weighted = sparse.diags(w) @ design
             means = member @ weighted
             normal[np.ix_(at, at)] += (design.T @ weighted - means.T @ sparse.diags(1 / summed) @ means).toarray()
-            right[at] += weighted.T @ prior[:, c] - means.T @ ((member @ (w * prior[:, c])) / summed)
+            rhs[at] += weighted.T @ prior[:, c] - means.T @ ((member @ (w * prior[:, c])) / summed)
         for at, penalty in zip(index, penalties):
-            normal[np.ix_(at[:own], at[:own])] += penalty
-        x = np.linalg.solve(normal + 1e-9 * np.trace(normal) / len(x) * np.eye(len(x)), right)
+            normal[np.ix_(at[:block], at[:block])] += penalty
+        x = np.linalg.solve(normal + 1e-9 * np.trace(normal) / len(x) * np.eye(len(x)), rhs)
         for c, (design, at) in enumerate(zip(designs, index)):
-            left = prior[:, c] - design @ x[at]
+            log_radiance = prior[:, c] - design @ x[at]
             w = weight[:, c]
-            residual[:, c] = left - ((member @ (w * left)) / np.maximum(member @ w, 1e-12))[point]
+            residual[:, c] = log_radiance - ((member @ (w * log_radiance)) / np.maximum(member @ w, 1e-12))[point]
         spread = SIGMA_OF_MAD * float(np.median(np.abs(residual)))
         # One weight for all channels: what is no diffuse surface is none in all of them.
         sigma = np.maximum(deviation, spread)
-        off = np.square(residual / sigma).mean(1, keepdims=True)
-        weight = np.median(sigma) ** 2 / sigma**2 / (1 + off / LEVELS.outlier**2)
+        chi_square = np.square(residual / sigma).mean(1, keepdims=True)
+        weight = np.median(sigma) ** 2 / sigma**2 / (1 + chi_square / LEVELS.outlier**2)
     log_response = np.stack([_log_srgb(CODES) + _splines(CODES, k) @ x[at[:k]] for at in index])
-    gain = np.stack([x[at[k:own]] for at in index], 1)
+    gain = np.stack([x[at[k:block]] for at in index], 1)
     contrast = _stated_contrast(gain.mean(1), stated)
     log_gain = (gain - gain.mean(0)) / contrast
     top = log_response[:, -1:]
     response = np.exp((log_response - top) / contrast)
     response[:, 0] = 0.0
-    # Light grows with its code, whatever noise said of codes that hardly occur.
+    # Radiance grows with its code, whatever noise gives for codes that hardly occur.
     response = np.maximum.accumulate(response, 1)
     return response, np.exp(log_gain), x[-2:] / contrast, spread
 
@@ -200,7 +204,7 @@ def _penalty(code: np.ndarray, frames: int) -> np.ndarray:
 
 
 def _stated_contrast(log_gain: np.ndarray, stated: np.ndarray) -> float:
-    """What the logarithms are too large by, from stated exposures (total least squares); 1 where they don't differ."""
+    """Factor by which the logarithms are too large, by stated exposures (total least squares); 1 if these are equal."""
     if stated.std() < CALIBRATION.least_range or log_gain.std() == 0:
         return 1.0
     return float(np.clip(log_gain.std() / stated.std(), 1 / CALIBRATION.widest, CALIBRATION.widest))

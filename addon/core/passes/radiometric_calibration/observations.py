@@ -55,7 +55,7 @@ def observe_codes(
     seed: int = 0,
     progress: Progress | Rounds | None = None,
 ) -> CodeObservations:
-    """What the frames' codes are at places spread over what they see, where codes are flat and not clipped.
+    """The frames' codes at places spread over the surface that they see, where codes are flat and not clipped.
 
     Parameters
     ----------
@@ -68,34 +68,34 @@ def observe_codes(
         From `progress`.
     """
     places, normals = _places(mesh, scene, frames, seed)
-    found = []
+    observations = []
 
-    def of(index: int) -> CodeObservations:
+    def observe(index: int) -> CodeObservations:
         return _in_frame(index, frames[index], read(frames[index]), scene, places, normals)
 
-    each = bytes_of_frame(frame.camera for frame in frames)
-    for index, observed in enumerate(ordered_map(of, range(len(frames)), threads, each=each)):
-        found.append(observed)
+    frame_bytes = bytes_of_frame(frame.camera for frame in frames)
+    for index, observed in enumerate(ordered_map(observe, range(len(frames)), threads, each=frame_bytes)):
+        observations.append(observed)
         if progress is not None:
             progress.update((index + 1) / len(frames))
-    return CodeObservations(*(np.concatenate([getattr(one, name) for one in found])
+    return CodeObservations(*(np.concatenate([getattr(observed, name) for observed in observations])
                               for name in ("point", "frame", "r2", "code", "histogram")))  # fmt: skip
 
 
 def _places(mesh: Mesh, scene: RayScene, frames: Sequence[Frame], seed: int) -> tuple[np.ndarray, np.ndarray]:
     """World positions and unit normals, (n, 3) each, of first hits through random pixels."""
     rng = np.random.default_rng(seed)
-    each = max(CALIBRATION.points // len(frames), CALIBRATION.least_points)
+    count = max(CALIBRATION.points // len(frames), CALIBRATION.least_points)
     normal, _ = mesh.geometry
     places, normals = [], []
     for frame in frames:
         camera = frame.camera
-        directions, led = camera.rays(rng.uniform((0, 0), (camera.width, camera.height), (each, 2)))
+        directions, valid = camera.rays(rng.uniform((0, 0), (camera.width, camera.height), (count, 2)))
         hits = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
-        ok = led & (hits.triangle >= 0)
-        facing = normal[hits.triangle[ok]]
-        facing = facing * -np.sign(np.einsum("ij,ij->i", facing, directions[ok]))[:, None]
-        places.append(camera.centre + hits.distance[ok, None].astype(np.float64) * directions[ok])
+        on_surface = valid & (hits.triangle >= 0)
+        facing = normal[hits.triangle[on_surface]]
+        facing = facing * -np.sign(np.einsum("ij,ij->i", facing, directions[on_surface]))[:, None]
+        places.append(camera.centre + hits.distance[on_surface, None].astype(np.float64) * directions[on_surface])
         normals.append(facing)
     return np.concatenate(places), np.concatenate(normals)
 
@@ -114,14 +114,14 @@ def _in_frame(
 
     towards = camera.centre - places
     cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.linalg.norm(towards, axis=1), 1e-30)
-    own = np.flatnonzero(cosine > CALIBRATION.grazing)
-    which, at = sees(camera, places[own], scene, SMALL.off, VISIBILITY.depth_tolerance)
+    points = np.flatnonzero(cosine > CALIBRATION.grazing)
+    visible, at = sees(camera, places[points], scene, SMALL.off, VISIBILITY.depth_tolerance)
     column, row = at.astype(int).T
-    kept = flat[row, column]
-    own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]
+    usable = flat[row, column]
+    points, at, column, row = points[visible[usable]], at[usable], column[usable], row[usable]
     r2 = np.square((at - (camera.cx, camera.cy)) / (camera.fx, camera.fy)).sum(1)
     return CodeObservations(
-        own, np.full(len(own), index), r2, code[row, column].astype(np.float64), _histogram(pixels)[None]
+        points, np.full(len(points), index), r2, code[row, column].astype(np.float64), _histogram(pixels)[None]
     )
 
 

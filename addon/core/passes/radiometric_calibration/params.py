@@ -1,4 +1,4 @@
-"""What radiometric calibration looks at, and what it takes for granted."""
+"""Parameters and priors of radiometric calibration."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class CalibrationParams:
     texture : float
         Relative standard deviation that radiance differs by between views of one place beside it.
     least_range : float
-        Standard deviation of the logarithm of stated exposures from which on they tell the curve's contrast.
+        Standard deviation of the logarithm of stated exposures from which on they determine the curve's contrast.
     widest : float
         Contrast that stated exposures may give the curve, over the prior's.
     border : float

@@ -7,7 +7,7 @@ view as its background does:
     I(x, wo) = D + tau b(x, wo)        b: the light field behind the object, along the ray
 
 with one tau for the object (glass), or 0 or 1 for each element (cut out). D is free for each element, so a background
-of the object's own colour decides nothing. Half of each element's views choose, the other half judge.
+of the object's own colour decides nothing. One half of each element's views fits, the other half tests.
 """
 
 from dataclasses import dataclass
@@ -62,21 +62,21 @@ def look_behind(
     origin = scene.off_surface(atlas.position[element], -atlas.normal[element])
     radiance, known = np.zeros((len(element), 3), np.float32), np.zeros(len(element), bool)
     surfaces = np.ones(len(element), int)
-    left = np.arange(len(element))
+    active = np.arange(len(element))
     for _ in range(SEE_THROUGH.surfaces):
-        hits = scene.intersect(origin[left], onward[left])
-        met = field.elements(hits)
-        own = (met >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
-        through = np.flatnonzero(~own)
-        at = left[through]
-        radiance[at] = field.arriving(hits.part(through), met[through], onward[at])
-        known[at] = np.where(met[through] >= 0, seen[met[through]], field.environment.seen)
-        step = hits.distance[own] + 4 * scene.offset
-        left = left[own]
-        if not len(left):
+        hits = scene.intersect(origin[active], onward[active])
+        hit_element = field.elements(hits)
+        same_object = (hit_element >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
+        exited = np.flatnonzero(~same_object)
+        at = active[exited]
+        radiance[at] = field.arriving(hits.part(exited), hit_element[exited], onward[at])
+        known[at] = np.where(hit_element[exited] >= 0, seen[hit_element[exited]], field.environment.seen)
+        step = hits.distance[same_object] + 4 * scene.offset
+        active = active[same_object]
+        if not len(active):
             break
-        origin[left] += step[:, None] * onward[left]
-        surfaces[left] += 1
+        origin[active] += step[:, None] * onward[active]
+        surfaces[active] += 1
     if noise > 0:
         known &= _well_inside(field, element, direction, object_id, LEVELS.sigmas * noise)
     return Behind(radiance, known, surfaces)
@@ -91,15 +91,15 @@ def _well_inside(
     up = np.cross(direction, across)
     inside = np.ones(len(element), bool)
     for side in (across, -across, up, -up):
-        left = np.flatnonzero(inside)
-        origin = field.atlas.position[element[left]] + margin * (side[left] + direction[left])
-        hits = field.scene.intersect(origin.astype(np.float32), np.ascontiguousarray(-direction[left], np.float32))
-        inside[left] = (hits.triangle >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
+        active = np.flatnonzero(inside)
+        origin = field.atlas.position[element[active]] + margin * (side[active] + direction[active])
+        hits = field.scene.intersect(origin.astype(np.float32), np.ascontiguousarray(-direction[active], np.float32))
+        inside[active] = (hits.triangle >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
     return inside
 
 
 def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) -> SeeThrough | None:
-    """Whether what is behind explains an object's frames better than anything of its own; None if nothing tells.
+    """Whether what is behind explains an object's frames better than its own light; None if known for too few elements.
 
     Parameters
     ----------
@@ -109,60 +109,64 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
         Standard deviation of the relative residual.
     """
     dense = DenseProblem(problem)
-    there = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
-    told = there.sum(0) >= LEVELS.views
-    if told.sum() < max(LEVELS.few, SEE_THROUGH.least_told * len(told)):
+    valid = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
+    usable = valid.sum(0) >= LEVELS.views
+    if usable.sum() < max(LEVELS.few, SEE_THROUGH.least_told * len(usable)):
         return None
-    b = dense.relative(behind.radiance)[..., told]
-    dense, there = dense.part(told), there[:, told]
-    rank = np.cumsum(there, 0)
-    first = there * (rank <= there.sum(0) / 2)
+    b = dense.relative(behind.radiance)[..., usable]
+    dense, valid = dense.part(usable), valid[:, usable]
+    rank = np.cumsum(valid, 0)
+    first_half = valid * (rank <= valid.sum(0) / 2)
     radiance = dense.I[:, 0]
     opaque = [radiance]
     if lobe is not None:
-        one = dense.lobe(dense.at(lobe.phi))
-        opaque.append(radiance - lobe.psi.astype(np.float32)[:, None, None] * one.A[:, 0] - one.B[:, 0])
-    costs = {name: np.zeros(int(told.sum())) for name in ("plain", "lobe", "glass", "holes")}
-    passed, holes = [], []
-    for train in (first, there - first):
-        test = there - train
-        plain, clear = _less_own(radiance, train), _less_own(b, train)
+        lobe_light = dense.lobe(dense.at(lobe.phi))
+        opaque.append(radiance - lobe.psi.astype(np.float32)[:, None, None] * lobe_light.A[:, 0] - lobe_light.B[:, 0])
+    costs = {name: np.zeros(int(usable.sum())) for name in ("plain", "lobe", "glass", "holes")}
+    transmissions, holes = [], []
+    for train in (first_half, valid - first_half):
+        test = valid - train
+        plain, background = _centred(radiance, train), _centred(b, train)
         costs["plain"] += _cost(plain, test, scale)
-        costs["lobe"] += _cost(_less_own(opaque[-1], train), test, scale)
-        tau = _transmission(plain, clear, train, scale)
-        costs["glass"] += _cost(plain - tau * clear, test, scale)
-        # A hole shows the background's changes in full; each element's first half of views says whether it is one.
-        hole = _cost(plain - clear, train, scale) < _cost(plain, train, scale)
-        costs["holes"] += _cost(plain - hole * clear, test, scale)
-        passed.append(tau)
+        costs["lobe"] += _cost(_centred(opaque[-1], train), test, scale)
+        tau = _transmission(plain, background, train, scale)
+        costs["glass"] += _cost(plain - tau * background, test, scale)
+        # A hole shows the background's changes in full; each element's first half of views decides whether it is one.
+        hole = _cost(plain - background, train, scale) < _cost(plain, train, scale)
+        costs["holes"] += _cost(plain - hole * background, test, scale)
+        transmissions.append(tau)
         holes.append(float(hole.mean()))
     best = costs["plain"] if costs["plain"].sum() <= costs["lobe"].sum() else costs["lobe"]
     cut_out = bool(costs["holes"].sum() < costs["glass"].sum())
-    found = costs["holes"] if cut_out else costs["glass"]
-    saved = best - found
+    cost = costs["holes"] if cut_out else costs["glass"]
+    saved = best - cost
     return SeeThrough(
-        transmission=float(np.mean(holes if cut_out else passed)),
+        transmission=float(np.mean(holes if cut_out else transmissions)),
         surfaces=float(behind.surfaces[behind.known].mean()),
         cut_out=cut_out,
-        score=float(found.sum() / max(costs["plain"].sum(), 1e-30)),
+        score=float(cost.sum() / max(costs["plain"].sum(), 1e-30)),
         gain=float(saved.sum() / max(best.sum(), 1e-30)),
         sigmas=float(saved.mean() / max(saved.std() / np.sqrt(len(saved)), 1e-30)),
     )
 
 
-def is_sure(found: SeeThrough) -> bool:
-    """Whether the object is to be set apart."""
-    return found.transmission >= SEE_THROUGH.least_told and found.gain > LEVELS.gain and found.sigmas > LEVELS.sigmas
+def is_sure(see_through: SeeThrough) -> bool:
+    """Whether the object is to be taken for transparent or cut out."""
+    return (
+        see_through.transmission >= SEE_THROUGH.least_told
+        and see_through.gain > LEVELS.gain
+        and see_through.sigmas > LEVELS.sigmas
+    )
 
 
-def _less_own(values: np.ndarray, train: np.ndarray) -> np.ndarray:
+def _centred(values: np.ndarray, train: np.ndarray) -> np.ndarray:
     """Values ((3, v, g)) less each element's mean over the views `train` ((v, g))."""
     return values - ((values * train).sum(1) / np.maximum(train.sum(0), 1e-9))[:, None]
 
 
-def _cost(rest: np.ndarray, views: np.ndarray, scale: float) -> np.ndarray:
+def _cost(residual: np.ndarray, views: np.ndarray, scale: float) -> np.ndarray:
     """Robust cost of each element over some views, (g,)."""
-    return (huber(np.sqrt(np.square(rest).mean(0)), scale) * views).sum(0, dtype=np.float64)
+    return (huber(np.sqrt(np.square(residual).mean(0)), scale) * views).sum(0, dtype=np.float64)
 
 
 def _transmission(values: np.ndarray, behind: np.ndarray, train: np.ndarray, scale: float) -> float:

@@ -1,1 +1,1 @@
-"""Gives the lit diffuse texture the detail back that its blur took."""
+"""Restores the detail that the lit diffuse texture lost by blur."""

@@ -1,4 +1,4 @@
-"""How the projection's blur is taken out; what it gains: docs/ablation.md."""
+"""How the projection's blur is removed; what it gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ class SharpeningParams:
     ----------
     detail : float
         Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even,
-        there is nothing to make sharper.
+        there is nothing to sharpen.
     most : float
         Times that L_d may become brighter or darker.
     """

@@ -1,7 +1,7 @@
-"""A sharper L_d: what the frames show and L_d, looked at through the same cameras, does not, is put back onto it.
+"""A sharper L_d: detail of the frames that L_d, rendered through the same cameras, lacks is projected back onto it.
 
 An observation is a pixel's mean over its footprint, taken between pixels, and L_d is the median of several of them: a
-tile's joint, a line of a board comes out paler than it is. So L_d is shown as each frame would show it, and the frame
+tile's joint, a line of a board comes out paler than it is. So L_d is rendered for each frame's camera, and the frame
 over that, a ratio, is projected back and multiplied onto L_d (iterative back-projection, Irani and Peleg 1991); its
 median over the frames leaves highlights out, as that of L_d does.
 
@@ -37,9 +37,9 @@ def sharpened(
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
     lookup: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
-    **how: Any,
+    **options: Any,
 ) -> LitDiffuse:
-    """L_d with the detail that its own blur took from it, where `ENOUGH` clean observations tell.
+    """L_d with the detail that it lost by blur, where there are `VISIBILITY.enough` clean observations.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def sharpened(
     read : callable
         Gives a frame's pixels.
     lookup : callable, optional
-        As `ElementLookup` finds elements, but -1 where the atlas has none; that one over all of it where left out.
-    **how
+        As `ElementLookup` finds elements, but -1 where the atlas has none; by default `surface.lookup`.
+    **options
         As `accumulate` takes it: median, order, seed, threads, folder, groups, progress.
 
     Raises
@@ -65,14 +65,16 @@ def sharpened(
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & _detailed(lit, atlas)
 
     def ratios(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
-        shown = _shown(view, surface, lookup, lit)
-        known = np.isfinite(shown).all(-1)
-        ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], shown, 0) + floor)
+        rendered = _render(view, surface, lookup, lit)
+        known = np.isfinite(rendered).all(-1)
+        ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], rendered, 0) + floor)
         return replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
 
-    found = accumulate(surface.mesh, atlas, surface.scene, frames, read, only=good, change=ratios, **how)
-    told = good & (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
-    ratio = np.where(told[:, None], np.clip(found.radiance, 1 / SHARPENING.most, SHARPENING.most), 1).astype(np.float32)
+    correction = accumulate(surface.mesh, atlas, surface.scene, frames, read, only=good, change=ratios, **options)
+    reliable = good & (correction.tier == CLEAN) & (correction.count >= VISIBILITY.enough)
+    ratio = np.where(reliable[:, None], np.clip(correction.radiance, 1 / SHARPENING.most, SHARPENING.most), 1).astype(
+        np.float32
+    )
     return replace(lit, radiance=lit.radiance * ratio, interquartile_range=lit.interquartile_range * ratio)
 
 
@@ -83,37 +85,37 @@ def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
     level[0, atlas.texel[known]] = lit.radiance[known].mean(1)
     level[1, atlas.texel[known]] = 1
     total, count = (uniform_filter(part.reshape(atlas.size, -1), 3).ravel()[atlas.texel] for part in level)
-    own = level[0, atlas.texel]
-    return np.abs(own - total / np.maximum(count, 1e-6)) > SHARPENING.detail * own
+    values = level[0, atlas.texel]
+    return np.abs(values - total / np.maximum(count, 1e-6)) > SHARPENING.detail * values
 
 
-def _shown(view: FrameView, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
-    """L_d as a camera shows it, (height, width, 3) float32; NaN where a pixel shows what has none."""
+def _render(view: FrameView, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
+    """L_d as a camera sees it, (height, width, 3) float32; NaN where a pixel shows what has none."""
     camera = view.camera
     width, height = camera.width, camera.height
 
-    def sent(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def radiance_at(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """L_d where rays hit, (k, 3) float32; NaN for triangle -1."""
-        met = np.flatnonzero(triangle >= 0)
-        element = lookup(triangle[met], u[met], v[met])
-        found = np.full((len(triangle), 3), np.nan, np.float32)
-        found[met[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
-        return found
+        hit = np.flatnonzero(triangle >= 0)
+        element = lookup(triangle[hit], u[hit], v[hit])
+        radiance = np.full((len(triangle), 3), np.nan, np.float32)
+        radiance[hit[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
+        return radiance
 
-    def traced(places: np.ndarray) -> np.ndarray:
-        directions, led = camera.rays(places)
+    def trace(places: np.ndarray) -> np.ndarray:
+        directions, valid = camera.rays(places)
         origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
         hits = surface.scene.intersect(origins, directions)
-        return sent(np.where(led, hits.triangle, -1), hits.u, hits.v)
+        return radiance_at(np.where(valid, hits.triangle, -1), hits.u, hits.v)
 
-    middle = sent(view.triangle.ravel(), view.u.ravel(), view.v.ravel()).reshape(height, width, 3)
-    # Corners of those pixels alone that show an element: often few, where few objects are asked for.
+    middle = radiance_at(view.triangle.ravel(), view.u.ravel(), view.v.ravel()).reshape(height, width, 3)
+    # Corners of those pixels alone that show an element: often few, where few objects are requested.
     known = np.isfinite(middle).all(-1)
     wanted = np.zeros((height + 1, width + 1), bool)
     for down in (slice(None, -1), slice(1, None)):
         for right in (slice(None, -1), slice(1, None)):
             wanted[down, right] |= known
     corner = np.full((height + 1, width + 1, 3), np.nan, np.float32)
-    corner[wanted] = traced(np.argwhere(wanted)[:, ::-1].astype(float))
+    corner[wanted] = trace(np.argwhere(wanted)[:, ::-1].astype(float))
     around = corner[1:, 1:] + corner[1:, :-1] + corner[:-1, 1:] + corner[:-1, :-1]
     return np.float32(MIDDLE) * middle + np.float32(CORNER) * around

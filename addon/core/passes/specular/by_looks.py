@@ -1,7 +1,7 @@
-"""Metal or coated by its looks: what an object's whole surface says where the views of its elements say too little.
+"""Metal or coated by appearance: an object's whole surface decides where the views of its elements say too little.
 
-Taps, legs and rings, soap and black tubes: too small, thin or seldom seen for a lobe to be told from view to view.
-`one_colour` compares what could explain all of such an object; here is what it takes to believe it.
+Taps, legs and rings, soap and black tubes: too small, thin or seldom seen for a lobe to show from view to view.
+`one_colour` compares the models that could explain all of such an object; here is when one of them is accepted.
 """
 
 from dataclasses import replace
@@ -22,13 +22,13 @@ from .params import LOOKS
 def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice:
     """An object's choice, METAL where one metal explains all of its surface and neither diffuse nor dielectric does.
 
-    For things that are small and thin: `problem` may hold elements of a single view. They are taken to be of one
-    colour; where they are not, texture widens all spreads and the choice stays.
+    For small and thin objects: `problem` may hold elements of a single view. They are taken to be of one colour; where
+    they are not, texture widens all spreads and the choice stays.
     """
     if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio:
         return choice
-    # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None sends more than it gets,
-    # beyond what the light is known to: a white bowl under a lamp had 2.1.
+    # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None reflects more than it
+    # receives, but for the light's error: a white bowl under a lamp had 2.1.
     if not MOST_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
     fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.metal, looks.diffuse)
@@ -43,8 +43,13 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
 
 def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
     """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
-    least, most = LOOKS.coated_spread
-    if looks.diffuse < least or looks.coated > most or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.sigmas:
+    min_diffuse, max_coated = LOOKS.coated_spread
+    if (
+        looks.diffuse < min_diffuse
+        or looks.coated > max_coated
+        or looks.ratio > LOOKS.ratio
+        or looks.sigmas < LEVELS.sigmas
+    ):
         return choice
     fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.diffuse)
     note = (
@@ -56,5 +61,5 @@ def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
 
 def _fit(phi: float, psi: np.ndarray, spread: float, diffuse: float) -> LobeFit:
     """The lobe as a fit; its residuals are median sizes, as `LobeFit` has them."""
-    residual, without = spread / SIGMA_OF_MAD, diffuse / SIGMA_OF_MAD
-    return LobeFit(phi, psi, 0.0, 0.0, residual, without)
+    residual, residual_lambertian = spread / SIGMA_OF_MAD, diffuse / SIGMA_OF_MAD
+    return LobeFit(phi, psi, 0.0, 0.0, residual, residual_lambertian)

@@ -1,4 +1,4 @@
-"""What was found of an object, or given, as its description: `ObjectMaterial`."""
+"""An object's description (`ObjectMaterial`), from its fit or from given values."""
 
 from dataclasses import replace
 
@@ -23,21 +23,21 @@ def lamp_material(
 ) -> ObjectMaterial:
     """The description of a lamp that was seen with `radiance` ((3,)), under the E of its elements, (k, 3).
 
-    `unlit` is its albedo with its light off; None where nothing tells.
+    `unlit` is its albedo with its light off; None where unknown.
     """
-    here = np.median(irradiance, 0) if len(irradiance) else np.zeros(3)
-    emission = given_off(radiance, here, LAMP_ALBEDO if unlit is None else unlit)
+    median_irradiance = np.median(irradiance, 0) if len(irradiance) else np.zeros(3)
+    emission = given_off(radiance, median_irradiance, LAMP_ALBEDO if unlit is None else unlit)
     return ObjectMaterial(instance.object_id, instance.class_name, EMITTER, emission=emission, unlit=unlit, note=note)
 
 
 def given_off(radiance: np.ndarray, irradiance: np.ndarray, albedo: float) -> tuple[float, float, float]:
-    """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
+    """Emission of a lamp seen with `radiance` ((3,)) under E ((3,)): less its reflection, `albedo` of that at most."""
     reflected = np.minimum(albedo * irradiance / np.pi, albedo * radiance)
     return rgb(radiance - reflected)
 
 
 def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> ObjectMaterial:
-    """The description of a mirror that was found before the shading, or that the capture tells of."""
+    """The description of a mirror that was found before the shading, or that the capture states."""
     note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
     return ObjectMaterial(
         instance.object_id, instance.class_name, METAL, alpha=0.0, f0=METAL.as_f0(mirror.f0),
@@ -46,9 +46,9 @@ def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> Object
 
 
 def described(
-    instance: Instance, choice: Choice, problem: Problem | None, target: str | None, sure: GlossInterval
+    instance: Instance, choice: Choice, problem: Problem | None, target: str | None, interval: GlossInterval
 ) -> ObjectMaterial:
-    """The description of what was chosen."""
+    """The description of an object with the model that was chosen for it."""
     fit = choice.fit
     common = ObjectMaterial(
         instance.object_id,
@@ -58,34 +58,34 @@ def described(
         observations=0 if problem is None else len(problem.element),
         residual=None if fit is None else fit.residual,
         residual_lambertian=None if fit is None else fit.residual_lambertian,
-        roughness_low=sure.roughness[0],
-        roughness_high=sure.roughness[1],
-        f0_low=sure.specular[0],
-        f0_high=sure.specular[1],
+        roughness_low=interval.roughness[0],
+        roughness_high=interval.roughness[1],
+        f0_low=interval.specular[0],
+        f0_high=interval.specular[1],
         scores=choice.scores,
         note=choice.note,
     )
     if choice.see_through is not None:
-        found = choice.see_through
-        surfaces = None if found.cut_out else found.surfaces
-        return replace(common, transmission=found.transmission, surfaces=surfaces)
+        see_through = choice.see_through
+        surfaces = None if see_through.cut_out else see_through.surfaces
+        return replace(common, transmission=see_through.transmission, surfaces=surfaces)
     if not choice.model.has_lobe:
         return replace(common, residual=common.residual_lambertian)
     f0 = metal_f0(problem, choice.lobe.phi) if choice.model.lobe_alone and problem is not None else choice.lobe.psi
     return replace(common, alpha=choice.lobe.phi, f0=choice.model.as_f0(f0))
 
 
-def as_given(found: ObjectMaterial, given: Given, choice: Choice, fitted_interval: GlossInterval) -> ObjectMaterial:
-    """The description of an object of which something was given; the interval is of what was fitted."""
+def as_given(material: ObjectMaterial, given: Given, choice: Choice, fitted_interval: GlossInterval) -> ObjectMaterial:
+    """The description of an object with given values; `fitted_interval` is of the fitted ones."""
     note = given_note(given)
-    if not choice.model.has_lobe:  # that there is no highlight is known, and what it would be like does not apply
-        return replace(found, roughness_low=None, roughness_high=None, f0_low=0.0, f0_high=0.0, note=note)
-    sure = given_interval(given, choice, fitted_interval)
+    if not choice.model.has_lobe:  # no lobe: F0 is known to be 0, a roughness does not apply
+        return replace(material, roughness_low=None, roughness_high=None, f0_low=0.0, f0_high=0.0, note=note)
+    interval = given_interval(given, choice, fitted_interval)
     f0 = choice.model.as_f0(choice.lobe.psi if given.f0 is None else given.f0)
     fitted = choice.lobe.residual > 0
     return replace(
-        found, f0=f0, note=note, residual=found.residual if fitted else None,
-        residual_lambertian=found.residual_lambertian if fitted else None,
-        roughness_low=sure.roughness[0], roughness_high=sure.roughness[1],
-        f0_low=sure.specular[0], f0_high=sure.specular[1],
+        material, f0=f0, note=note, residual=material.residual if fitted else None,
+        residual_lambertian=material.residual_lambertian if fitted else None,
+        roughness_low=interval.roughness[0], roughness_high=interval.roughness[1],
+        f0_low=interval.specular[0], f0_high=interval.specular[1],
     )  # fmt: skip

@@ -1,6 +1,6 @@
-"""Objects of which the artist gives something: that is held, and what is left is fitted under it.
+"""Objects with values given by the artist: those are kept, and the others are fitted with them fixed.
 
-What is given decides the model, too, where that itself is not: a roughness or F0 makes an object glossy, an F0 that no
+Given values decide the model, too, unless that is given itself: a roughness or F0 makes an object glossy, an F0 that no
 dielectric has makes it a metal. Nothing is chosen, nothing is taken over from the class.
 """
 
@@ -26,9 +26,9 @@ from .problems import Problems
 
 
 def fit_given(
-    given: Given, maker: Problems, object_id: int, irradiance: np.ndarray, rays: int
+    given: Given, problems: Problems, object_id: int, irradiance: np.ndarray, rays: int
 ) -> tuple[Choice, Problem | None]:
-    """Model and lobe of an object under what is given of it, and the observations that the rest was fitted to.
+    """Model and lobe of an object with given values, and the observations that the others were fitted to.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def fit_given(
     if given.brdf is not None and not given.brdf.has_lobe:
         return Choice(given.brdf, None, sigmas=GIVEN.sure), None
     phi = None if given.roughness is None else given.roughness**2
-    problem, enough = _problem(maker, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets or GGX)
+    problem, enough = _problem(problems, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets or GGX)
     model = given.brdf or _model(given, problem, enough)
     f0 = None if given.f0 is None else np.broadcast_to(np.asarray(model.as_f0(given.f0), float), 3)
     fit = _fit(model, phi, f0, problem, enough, irradiance)
@@ -52,16 +52,16 @@ def fit_given(
 
 
 def _problem(
-    maker: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
+    problems: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
 ) -> tuple[Problem | None, bool]:
-    """The object's observations, and whether they can tell what changes with the view."""
-    index, enough = maker.pick(object_id, LEVELS.of_object, FIT.views, seed=1, smooth=True), True
-    if len(np.unique(maker.element(index))) < LEVELS.few:
-        index, enough = maker.pick(object_id, LEVELS.of_object, LEVELS.views, least=1, seed=1), False
+    """The object's observations, and whether they suffice to see what changes with the view."""
+    index, enough = problems.pick(object_id, LEVELS.of_object, FIT.views, seed=1, smooth=True), True
+    if len(np.unique(problems.element(index))) < LEVELS.few:
+        index, enough = problems.pick(object_id, LEVELS.of_object, LEVELS.views, min_views=1, seed=1), False
     if not len(index):
         return None, False
     width = None if phi is None else max(phi, float(GRID[0]))
-    return maker.problem(index, rays, phi=width, microfacets=microfacets), enough
+    return problems.problem(index, rays, phi=width, microfacets=microfacets), enough
 
 
 def _model(given: Given, problem: Problem | None, enough: bool) -> Brdf:
@@ -96,7 +96,7 @@ def _fit(
 
 
 def given_interval(given: Given, choice: Choice, fitted: GlossInterval) -> GlossInterval:
-    """The intervals of what was given, without width, and of the rest as fitted."""
+    """The intervals of given values, without width, and of the others as fitted."""
     if not choice.model.has_lobe:
         return UNKNOWN
     rough = (given.roughness,) * 2 if given.roughness is not None else fitted.roughness
@@ -105,28 +105,30 @@ def given_interval(given: Given, choice: Choice, fitted: GlossInterval) -> Gloss
 
 
 def given_note(given: Given) -> str:
-    """One sentence on what was given."""
-    told = given.as_dict()
-    said = [f"{name} {_said(told[name])}" for name in ("model", "roughness", "f0", "base_color") if name in told]
-    rest = (
+    """One sentence that names the given values."""
+    values = given.as_dict()
+    parts = [
+        f"{name} {_formatted(values[name])}" for name in ("model", "roughness", "f0", "base_color") if name in values
+    ]
+    fitted_names = (
         []
         if given.brdf is not None and not given.brdf.has_lobe
-        else [name for name, found in (("roughness", given.roughness), ("f0", given.f0)) if found is None]
+        else [name for name, value in (("roughness", given.roughness), ("f0", given.f0)) if value is None]
     )
-    fitted = f"; {' and '.join(rest)} fitted under it" if rest and len(told) else ""
+    fitted = f"; {' and '.join(fitted_names)} fitted under it" if fitted_names and len(values) else ""
     lamp = " The light on the room was not found anew." if given.brdf is not None and given.brdf.gives_light else ""
-    return f"Given by the user: {', '.join(said)}{fitted}.{lamp}"
+    return f"Given by the user: {', '.join(parts)}{fitted}.{lamp}"
 
 
-def same_material(other: ObjectMaterial, own: ObjectMaterial) -> ObjectMaterial:
-    """An object's description with model and highlight of another one."""
-    taken = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "roughness_low", "roughness_high",
+def same_material(source: ObjectMaterial, material: ObjectMaterial) -> ObjectMaterial:
+    """An object's description with the model and lobe of another one, `source`."""
+    copied = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "roughness_low", "roughness_high",
              "f0_low", "f0_high")  # fmt: skip
-    note = f"Given by the user: the same as object {other.object_id}."
-    return replace(own, **{name: getattr(other, name) for name in taken}, note=note)
+    note = f"Given by the user: the same as object {source.object_id}."
+    return replace(material, **{name: getattr(source, name) for name in copied}, note=note)
 
 
-def _said(value: object) -> str:
+def _formatted(value: object) -> str:
     if isinstance(value, list):
-        return f"({', '.join(f'{one:.3g}' for one in value)})"
+        return f"({', '.join(f'{item:.3g}' for item in value)})"
     return value if isinstance(value, str) else f"{value:.3g}"

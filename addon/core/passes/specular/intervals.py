@@ -1,4 +1,4 @@
-"""How sure roughness and specular are: 90 % intervals by a delete-group jackknife over an object's elements.
+"""Uncertainty of roughness and specular: 90 % intervals by a delete-group jackknife over an object's elements.
 
 The groups are runs of neighbouring elements (the atlas's order), so that what neighbours share, a piece of texture or
 a badly posed frame, is left out together. The jackknife knows nothing of what all elements have in common (error of the
@@ -38,10 +38,10 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     if not choice.model.has_lobe or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
-    spread, known = (0.0, 0.0), INTERVALS.adopted if choice.looks is None else INTERVALS.by_looks
+    spread, roughness_systematic = (0.0, 0.0), INTERVALS.adopted if choice.looks is None else INTERVALS.by_looks
     if choice.sigmas > 0 and problem is not None and choice.looks is None:
-        spread, known = jackknife(problem, choice.model), INTERVALS.roughness_systematic
-    width = Z90 * float(np.hypot(spread[0], known))
+        spread, roughness_systematic = jackknife(problem, choice.model), INTERVALS.roughness_systematic
+    width = Z90 * float(np.hypot(spread[0], roughness_systematic))
     systematic = INTERVALS.metal_systematic if choice.model.lobe_alone else INTERVALS.specular_systematic
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))
     return GlossInterval(
@@ -58,6 +58,6 @@ def jackknife(problem: Problem, model: Brdf) -> tuple[float, float]:
         return 0.3, 0.3
     group = np.arange(count) * groups // count
     fits = [fit_lobe(dense.part(group != left_out), constraints=model.constraints) for left_out in range(groups)]
-    found = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
-    error = np.sqrt((groups - 1) / groups * np.square(found - found.mean(0)).sum(0))
+    estimates = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
+    error = np.sqrt((groups - 1) / groups * np.square(estimates - estimates.mean(0)).sum(0))
     return float(error[0]), float(error[1])

@@ -1,4 +1,4 @@
-"""Which model an object needs: Lambertian, a dielectric lobe over diffuse, or metal; none richer than the data show."""
+"""Model selection: Lambertian, a dielectric lobe over diffuse, or metal; the simplest that the data support."""
 
 from dataclasses import dataclass, field, replace
 
@@ -42,13 +42,13 @@ class Choice:
     note: str = ""
     scores: dict[str, float] = field(default_factory=dict)
     dielectric: LobeFit | None = None
-    """A dielectric's sure lobe that serves nearly as well as the metal's that was taken."""
+    """A dielectric's significant lobe that fits nearly as well as the metal's that was taken."""
     metal: LobeFit | None = None
-    """A metal's lobe that serves better than any other model, but not beyond doubt."""
+    """A metal's lobe that fits better than any other model, but not significantly."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
     looks: OneColour | Coated | None = None
-    """What said that it is metal or coated, where its views alone did not (`by_looks`)."""
+    """The comparison that makes it metal or coated, where its views alone do not (`by_looks`)."""
 
     @property
     def lobe(self) -> LobeFit:
@@ -59,32 +59,32 @@ class Choice:
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
-    """Share of the elements' costs that the lobe takes off, and that in standard errors."""
+    """Share of the elements' costs that the lobe saves, and the same in standard errors."""
     saved = without - with_lobe
     error = saved.std() / np.sqrt(len(saved))
     # Elements seen once cost nothing either way, but for rounding.
     return float(saved.sum() / max(without.sum(), 1e-6 * len(saved))), float(saved.mean() / max(error, 1e-30))
 
 
-def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
-    """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
-    dense, scale = _weighed(DenseProblem(held), fit)
+def gain_of(fit: LobeFit, held_out: Problem) -> tuple[float, float]:
+    """Share of the cost that a fit's lobe saves on held-out elements, and the same in standard errors."""
+    dense, scale = _weighted(DenseProblem(held_out), fit)
     return _gain(*element_costs(dense, fit, scale))
 
 
-def _weighed(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
-    """An object's observations as sure as they are under its own fit, and the standard deviation of their residual."""
+def _weighted(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
+    """An object's observations weighted as under its own fit, and the standard deviation of their residual."""
     scale = max(SIGMA_OF_MAD * fit.residual, 1e-4)
     return dense.expecting(fit.phi, fit.psi, scale), scale
 
 
-def _dielectric(fit: LobeFit) -> bool:
-    """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
+def _is_dielectric(fit: LobeFit) -> bool:
+    """Whether a dielectric can have this lobe, and it can be distinguished from a diffuse part."""
     return fit.psi[0] <= MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
-def _metallic(fit: LobeFit) -> bool:
-    """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
+def _is_metallic(fit: LobeFit) -> bool:
+    """Whether this lobe is too strong for a dielectric, and can be distinguished from a diffuse part."""
     return float(fit.psi.mean()) > MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
@@ -94,43 +94,45 @@ def _bare_metal(
     """A metal's lobe of width phi with no diffuse part at all: `fit` with its F0, and the elements' costs, (g,)."""
     f0 = metal_f0(problem, phi)
     lobe = dense.lobe(dense.at(phi))
-    rest = dense.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
-    size = np.sqrt(np.square(rest[:, 0]).mean(0)) / dense.spread
+    residual = dense.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
+    size = np.sqrt(np.square(residual[:, 0]).mean(0)) / dense.spread
     return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * dense.there).sum(0, dtype=np.float64)
 
 
 def metal_fit(problem: Problem, dense: DenseProblem) -> LobeFit:
     """The lobe of what is known to be a metal: the one over a diffuse part if it is a metal's, else the lobe alone."""
     metal = fit_lobe(dense, constraints=METAL.constraints)
-    if _metallic(metal):
+    if _is_metallic(metal):
         return metal
     widths = dense.grid[dense.grid <= FIT.broadest_phi] if len(dense.grid) > 1 else dense.grid
-    dense, scale = _weighed(dense, metal)
-    return min((_bare_metal(problem, dense, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
+    dense, scale = _weighted(dense, metal)
+    return min(
+        (_bare_metal(problem, dense, phi, metal, scale) for phi in widths), key=lambda candidate: candidate[1].sum()
+    )[0]
 
 
-def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | None) -> LobeFit:
-    """An object's own lobe where it explains its frames better than that of its class does, beyond doubt; else that.
+def _own_or_class_lobe(own_lobe: LobeFit, class_lobe: LobeFit, model: Brdf, problem: Problem | None) -> LobeFit:
+    """An object's own lobe where it explains its frames significantly better than that of its class; else the class's.
 
-    A metal's F0 is its own in either.
+    A metal's F0 is its own in either case.
     """
-    shared = replace(own, phi=of_class.phi, psi=own.psi if model.lobe_alone else of_class.psi)
+    shared = replace(own_lobe, phi=class_lobe.phi, psi=own_lobe.psi if model.lobe_alone else class_lobe.psi)
     if problem is None:
         return shared
-    dense, scale = _weighed(DenseProblem(problem), own)
+    dense, scale = _weighted(DenseProblem(problem), own_lobe)
     if model.lobe_alone:
-        solved = solve(dense, dense.at(shared.phi), own.kappa, scale, constraints=model.constraints)
+        solved = solve(dense, dense.at(shared.phi), own_lobe.kappa, scale, constraints=model.constraints)
         shared = replace(shared, psi=solved.psi[:, 0])
-    (with_own, _), (with_shared, _) = (element_costs(dense, fit, scale) for fit in (own, shared))
+    (with_own, _), (with_shared, _) = (element_costs(dense, fit, scale) for fit in (own_lobe, shared))
     gain, sigmas = _gain(with_own, with_shared)
-    return own if gain > CHOICE.min_gain and sigmas > LEVELS.sigmas else shared
+    return own_lobe if gain > CHOICE.min_gain and sigmas > LEVELS.sigmas else shared
 
 
 def choose_model(problem: Problem, part: bool = False) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements.
 
-    A `part` that shape alone tells may hold other things without a highlight: its lobe need only be likely, however
-    little it gains. It is never called metal, which would take the texture of all of them.
+    A `part` that is found by shape alone may hold other objects without a highlight: its lobe need only be likely,
+    however little it gains. It is never called metal, which would take the texture of all of them.
     """
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
@@ -138,13 +140,13 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     odd = (np.random.default_rng(0).permutation(dense.there.shape[1]) % 2).astype(bool)
 
     def held_out(fit: LobeFit, model: Brdf) -> tuple[np.ndarray, np.ndarray]:
-        """Costs of the elements with the lobe that the others gave, and without one."""
-        found = [held_out_costs(dense, fit, train, scale, model.constraints) for train in (odd, ~odd)]
-        with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
+        """Costs of the elements with the lobe fitted to the others, and without one."""
+        halves = [held_out_costs(dense, fit, train, scale, model.constraints) for train in (odd, ~odd)]
+        with_lobe, without = (np.concatenate(costs) for costs in zip(*halves, strict=True))
         return with_lobe, without
 
     fit = fit_lobe(dense, constraints=DIELECTRIC.constraints)
-    dense, scale = _weighed(dense, fit)
+    dense, scale = _weighted(dense, fit)
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
@@ -154,16 +156,19 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
-    if not part and _metallic(metal):
+    if not part and _is_metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
-        # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
-        (less, by), (more, surely) = _gain(with_metal, diffuse), _gain(with_metal, with_lobe)
-        alone = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
-        if min(less, more) > CHOICE.min_gain and alone <= CHOICE.bare * diffuse.sum():
-            if by > LEVELS.sigmas and surely > LEVELS.likely:
-                other = dielectric if sure and surely < LEVELS.sigmas else None
-                return Choice(METAL, metal, less, by, scores=scores, dielectric=other)
+        # A broad lobe of a dielectric can look like a weak metal's: it must be distinguished from that, too.
+        (metal_gain, metal_sigmas), (gain_over_dielectric, sigmas_over_dielectric) = (
+            _gain(with_metal, diffuse),
+            _gain(with_metal, with_lobe),
+        )
+        bare_cost = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
+        if min(metal_gain, gain_over_dielectric) > CHOICE.min_gain and bare_cost <= CHOICE.bare * diffuse.sum():
+            if metal_sigmas > LEVELS.sigmas and sigmas_over_dielectric > LEVELS.likely:
+                alternative = dielectric if sure and sigmas_over_dielectric < LEVELS.sigmas else None
+                return Choice(METAL, metal, metal_gain, metal_sigmas, scores=scores, dielectric=alternative)
             likely = metal
     if sure:
         return Choice(DIELECTRIC, dielectric, gain, sigmas, scores=scores, metal=likely)
@@ -171,121 +176,125 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely)
 
 
-def set_apart(choice: Choice, found: SeeThrough, sure: bool) -> Choice:
-    """An object's choice, TRANSPARENT where its frames `sure`ly show what is behind it."""
-    scores = choice.scores | {TRANSPARENT.name: found.score}
+def set_apart(choice: Choice, see_through: SeeThrough, sure: bool) -> Choice:
+    """An object's choice, TRANSPARENT if it is `sure` that its frames show what is behind it."""
+    scores = choice.scores | {TRANSPARENT.name: see_through.score}
     if not sure:
         return replace(choice, scores=scores)
-    what = (
-        f"cut out, with holes over {found.transmission:.0%} of it"
-        if found.cut_out
-        else (f"transparent: {found.transmission:.0%} of what is behind it passes")
+    description = (
+        f"cut out, with holes over {see_through.transmission:.0%} of it"
+        if see_through.cut_out
+        else (f"transparent: {see_through.transmission:.0%} of what is behind it passes")
     )
-    note = f"Set apart as {what}. Its own colour is uncertain."
-    return Choice(TRANSPARENT, None, found.gain, found.sigmas, note, scores, see_through=found)
+    note = f"Set apart as {description}. Its own colour is uncertain."
+    return Choice(TRANSPARENT, None, see_through.gain, see_through.sigmas, note, scores, see_through=see_through)
 
 
 def adopt_from_class(
     choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
 ) -> dict[int, Choice]:
-    """One lobe for each class of objects, unless an object's own frames speak against it.
+    """One lobe for each class of objects, unless an object's own frames contradict it.
 
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
-    model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
-    whose own frames decide nothing take over the class's if all members' frames together are sure of a lobe, but not
-    where it raises their cost by more than `excluded`.
-    What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
-    one, as rough as the others unless its frames are sure of something else. Among dielectrics, one that is a metal no
-    more surely than it is one of them is one of them.
+    model, weighted by evidence. Members keep their own lobe where it fits significantly better than that. Objects whose
+    own frames decide nothing adopt the class's if the frames of all members together are sure of a lobe, but not where
+    it raises their cost by more than `LEVELS.gain`.
+    Transparent objects neither give nor take. In a class of metals, a member whose frames favour metal, but not
+    significantly, becomes one, as rough as the others unless its frames are sure of something else. In a class of
+    dielectrics, a metal that a dielectric's lobe fits nearly as well becomes a dielectric.
     """
     result, choices = dict(choices), {i: choice for i, choice in choices.items() if not choice.model.see_through}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
         members = {i: choice for i, choice in choices.items() if class_of[i] == name}
         if not any(choice.model.has_lobe for choice in members.values()):
-            together = _together(members)
-            members, result = members | together, result | together
-        found = {i: choice for i, choice in members.items() if choice.model.has_lobe}
-        if not found:
+            joint = _jointly_glossy(members)
+            members, result = members | joint, result | joint
+        glossy = {i: choice for i, choice in members.items() if choice.model.has_lobe}
+        if not glossy:
             continue
-        judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
-        clear = {i for i, one in judges.items() if not (one.dielectric if one.model.lobe_alone else one.metal)}
-        source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
-        model = _pooled([c for c in judges.values() if c.model is found[source].model], found[source])
-        agreed = not model.model.layered or _agreed(members)
+        judges = {i: choice for i, choice in glossy.items() if not isinstance(choice.looks, Coated)} or glossy
+        clear = {
+            i for i, choice in judges.items() if not (choice.dielectric if choice.model.lobe_alone else choice.metal)
+        }
+        source = max(sorted(clear) or judges, key=lambda i: glossy[i].sigmas)
+        shared = _pooled([c for c in judges.values() if c.model is glossy[source].model], glossy[source])
+        agreed = not shared.model.layered or _jointly_significant(members)
         for i, choice in members.items():
-            turns = model.model.lobe_alone and not choice.model.lobe_alone
-            if turns and choice.metal is not None:
+            may_become_metal = shared.model.lobe_alone and not choice.model.lobe_alone
+            if may_become_metal and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
-                fit = _of_class(choice.metal, model.lobe, model.model, problems.get(i))
-                result[i] = replace(choice, model=model.model, fit=fit, note=note)
-            elif model.model.layered and choice.dielectric is not None:
+                fit = _own_or_class_lobe(choice.metal, shared.lobe, shared.model, problems.get(i))
+                result[i] = replace(choice, model=shared.model, fit=fit, note=note)
+            elif shared.model.layered and choice.dielectric is not None:
                 note = "Like a metal, but not beyond doubt; others of its class are not."
-                fit = _of_class(choice.dielectric, model.lobe, model.model, problems.get(i))
-                result[i] = replace(choice, model=model.model, fit=fit, note=note)
-            elif not choice.model.has_lobe and agreed and not _refused(model.lobe, choice.fit, problems.get(i)):
+                fit = _own_or_class_lobe(choice.dielectric, shared.lobe, shared.model, problems.get(i))
+                result[i] = replace(choice, model=shared.model, fit=fit, note=note)
+            elif not choice.model.has_lobe and agreed and not _contradicted(shared.lobe, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
-                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
-            elif choice.model is model.model and len(found) > 1 and i in problems:
-                # By looks alone it has no lobe of its own, where views of others tell one.
-                own = None if choice.looks is not None and model.looks is None else problems[i]
-                result[i] = replace(choice, fit=_of_class(choice.lobe, model.lobe, model.model, own))
+                result[i] = replace(shared, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
+            elif choice.model is shared.model and len(glossy) > 1 and i in problems:
+                # A lobe by appearance alone gives way to the class's, where views of others determine that.
+                own_problem = None if choice.looks is not None and shared.looks is None else problems[i]
+                result[i] = replace(choice, fit=_own_or_class_lobe(choice.lobe, shared.lobe, shared.model, own_problem))
     return result
 
 
-def _together(members: dict[int, Choice]) -> dict[int, Choice]:
-    """The members of a class that each gain by a lobe, as specular, if they are sure enough of it together.
+def _jointly_glossy(members: dict[int, Choice]) -> dict[int, Choice]:
+    """The members of a class that each gain by a lobe, as dielectrics, if that is significant for all together.
 
     None of them is by itself; all that have any evidence count, also those that speak against a lobe. One that gains by
     what is no dielectric's lobe (diffuse curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for
     none.
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
-    if len(judged) < 2 or not _agreed(members):
+    if len(judged) < 2 or not _jointly_significant(members):
         return {}
     return {
         i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
-        if choice.gain > CHOICE.min_gain and _dielectric(choice.lobe)
+        if choice.gain > CHOICE.min_gain and _is_dielectric(choice.lobe)
     }
 
 
-def _agreed(members: dict[int, Choice]) -> bool:
-    """Whether the frames of a class's members together are sure of a dielectric's lobe (Stouffer's sum of z-scores)."""
+def _jointly_significant(members: dict[int, Choice]) -> bool:
+    """Whether a class's members together have a significant dielectric lobe (Stouffer's combined z-score)."""
     judged = [choice for choice in members.values() if choice.fit is not None]
-    counted = [c.sigmas if c.model.has_lobe or _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged]
+    counted = [c.sigmas if c.model.has_lobe or _is_dielectric(c.lobe) else min(c.sigmas, 0) for c in judged]
     return bool(judged) and sum(counted) / np.sqrt(len(judged)) > LEVELS.sigmas
 
 
-def _pooled(found: list[Choice], best: Choice) -> Choice:
+def _pooled(choices: list[Choice], best: Choice) -> Choice:
     """`best` with the median phi and psi of several choices, weighted by their evidence.
 
-    Of those that views speak for, if any: by looks alone lobes come out too broad (spot rings' roughness .7 for .2).
+    Of those that views determine, if any: by appearance alone lobes are too broad (spot rings' roughness .7 for .2).
     """
-    found = [choice for choice in found if choice.looks is None] or found
-    weight = np.square([choice.sigmas for choice in found])
-    phi = weighted_median(np.array([choice.lobe.phi for choice in found]), weight)
-    psi = [weighted_median(values, weight) for values in np.array([choice.lobe.psi for choice in found]).T]
+    choices = [choice for choice in choices if choice.looks is None] or choices
+    weight = np.square([choice.sigmas for choice in choices])
+    phi = weighted_median(np.array([choice.lobe.phi for choice in choices]), weight)
+    psi = [weighted_median(values, weight) for values in np.array([choice.lobe.psi for choice in choices]).T]
     return replace(best, fit=replace(best.lobe, phi=phi, psi=np.array(psi)))
 
 
-def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:
-    """Whether an object's own frames speak against its class's lobe."""
+def _contradicted(lobe: LobeFit, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
+    """Whether an object's own frames contradict its class's lobe."""
     if problem is None or len(np.unique(problem.element)) < LEVELS.few:
         return False
-    if own is not None:
-        # How its diffuse part darkens is the object's own matter, with the class's lobe as without.
-        lobe = replace(lobe, kappa=own.kappa, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
+    if own_lobe is not None:
+        # How its diffuse part darkens remains the object's own, with the class's lobe as without.
+        lobe = replace(
+            lobe, kappa=own_lobe.kappa, kappa_lambertian=own_lobe.kappa_lambertian, residual=own_lobe.residual
+        )
     return gain_of(lobe, problem)[0] < -LEVELS.gain
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:
-    """F0 of a metal, (3,): what it reflects, held between what metals can."""
+    """F0 of a metal, (3,): its reflectance, limited to what metals have."""
     return np.clip(reflectance(problem, phi), 0.02, 1.0)
 
 
 def reflectance(problem: Problem, phi: float) -> np.ndarray:
     """F0 of what has no diffuse part, (3,): all its light is the lobe's, so I = F0 A + B; the median ratio over the
-    observations. Above 1 it sends more than it gets."""
+    observations. Above 1 it reflects more than it receives."""
     at = nearest(problem.light.grid, phi)
     A, B = problem.light.A[:, at].astype(np.float64), problem.light.B[:, at].astype(np.float64)
     strong = A.mean(1) >= np.median(A.mean(1)) * 0.5

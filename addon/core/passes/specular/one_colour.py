@@ -1,13 +1,13 @@
 """Whether an object looks like a metal or coated all over: diffuse, dielectric and metal compared, each of one colour.
 
-`models` asks what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
+`models` fits what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
 rings) leave it little: few views of few elements, on a mesh coarser than what they mirror. But a metal shows the room,
 and everything diffuse the light that arrives: over a whole object of one colour the radiance follows one or the other.
 What is compared is the robust spread of log(I / prediction) over all observations; a factor common to all is free, so
-none of the three has to know its colour. Texture widens all three spreads alike, and so speaks for none.
+none of the three has to know its colour. Texture widens all three spreads alike, and so favours none.
 
-A coat of no colour of its own over a saturated one shows in the dark channels, too: diffuse and dielectric are compared
-by channel (`compare_coat`).
+An uncoloured coat over a saturated base shows in the dark channels, too: diffuse and dielectric are compared by channel
+(`compare_coat`).
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from .params import FIT
 
 @dataclass(frozen=True)
 class OneColour:
-    """How well each kind of matter of one colour explains an object's frames.
+    """How well each model, of one colour, explains an object's frames.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class OneColour:
 
     @property
     def ratio(self) -> float:
-        """The metal's spread over that; below 1 speaks for metal."""
+        """The metal's spread over that; below 1 favours metal."""
         return self.metal / self.other
 
 
@@ -74,7 +74,7 @@ class Coated:
 
     @property
     def ratio(self) -> float:
-        """The coated spread over the diffuse one; below 1 speaks for a coat."""
+        """The coated spread over the diffuse one; below 1 favours a coat."""
         return self.coated / self.diffuse
 
 
@@ -87,23 +87,23 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    told = _told(problem, irradiance)
-    if told is None:
+    observations = _usable(problem, irradiance)
+    if observations is None:
         return None
-    usable, seen, E, element = told
-    light, log_I = problem.light, np.log(seen @ LUMINANCE)
+    usable, radiance, E, element = observations
+    light, log_I = problem.light, np.log(radiance @ LUMINANCE)
     widths = np.flatnonzero(light.grid <= FIT.broadest_phi)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted) about its median, (k,)."""
-        rest = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
-        return rest - np.median(rest)
+        log_ratio = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
+        return log_ratio - np.median(log_ratio)
 
     diffuse = residual(E @ LUMINANCE)
-    coats = (_one_colour(seen, E, _coat(problem, at)[usable]) for at in widths)
+    coats = (_one_colour(radiance, E, _coat(problem, at)[usable]) for at in widths)
     dielectric = min((residual(predicted @ LUMINANCE) for predicted in coats), key=spread)
     metals = [residual(light.A[usable, at] @ LUMINANCE) for at in widths]
-    best = int(np.argmin([spread(rest) for rest in metals]))
+    best = int(np.argmin([spread(log_ratio) for log_ratio in metals]))
     other, metal = min(diffuse, dielectric, key=spread), metals[best]
     return OneColour(
         spread(diffuse),
@@ -123,21 +123,21 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    told = _told(problem, irradiance)
-    if told is None:
+    observations = _usable(problem, irradiance)
+    if observations is None:
         return None
-    usable, seen, E, element = told
+    usable, radiance, E, element = observations
     widths = np.flatnonzero(problem.light.grid <= FIT.broadest_phi)
-    least = LEVELS.dark * np.median(seen)
+    floor = LEVELS.dark * np.median(radiance)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted), (k, 3); a factor common to all channels is free."""
-        rest = np.log(np.maximum(seen, least) / np.maximum(predicted, least))
-        return rest - np.median(rest.mean(1))
+        log_ratio = np.log(np.maximum(radiance, floor) / np.maximum(predicted, floor))
+        return log_ratio - np.median(log_ratio.mean(1))
 
-    diffuse = residual(_one_colour(seen, E, np.zeros(1, np.float32)))
-    coats = [residual(_one_colour(seen, E, _coat(problem, at)[usable])) for at in widths]
-    best = int(np.argmin([spread(rest) for rest in coats]))
+    diffuse = residual(_one_colour(radiance, E, np.zeros(1, np.float32)))
+    coats = [residual(_one_colour(radiance, E, _coat(problem, at)[usable])) for at in widths]
+    best = int(np.argmin([spread(log_ratio) for log_ratio in coats]))
     return Coated(
         spread(diffuse),
         spread(coats[best]),
@@ -146,8 +146,8 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     )
 
 
-def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
+def _usable(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Which observations are usable, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
     bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
     usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
     if usable.sum() < LEVELS.enough:
@@ -160,16 +160,16 @@ def _coat(problem: Problem, at: int) -> np.ndarray:
     return USUAL_F0 * problem.light.A[:, at] + problem.light.B[:, at]
 
 
-def _one_colour(seen: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:
+def _one_colour(radiance: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:
     """Radiance (k, 3) of the one albedo under a coat that suits most observations."""
-    rho = np.clip(np.median(np.pi * (seen - coat) / np.maximum(E, 1e-9), 0), 0, 1)
+    rho = np.clip(np.median(np.pi * (radiance - coat) / np.maximum(E, 1e-9), 0), 0, 1)
     return rho * E / np.pi + coat
 
 
-def _sigmas(one: np.ndarray, other: np.ndarray, element: np.ndarray) -> float:
-    """By how many standard errors over the elements residuals (k,) or (k, 3) of one kind are less than another's."""
-    most = LEVELS.sigmas * spread(other)
-    saved = np.minimum(np.abs(other), most) - np.minimum(np.abs(one), most)
+def _sigmas(residual: np.ndarray, reference: np.ndarray, element: np.ndarray) -> float:
+    """By how many standard errors over the elements `residual` ((k,) or (k, 3)) is smaller than `reference`."""
+    limit = LEVELS.sigmas * spread(reference)
+    saved = np.minimum(np.abs(reference), limit) - np.minimum(np.abs(residual), limit)
     _, group, count = np.unique(element, return_inverse=True, return_counts=True)
     by_element = np.bincount(group, saved.reshape(len(element), -1).mean(1)) / count
     error = by_element.std() / np.sqrt(len(by_element))

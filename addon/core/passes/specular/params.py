@@ -1,4 +1,4 @@
-"""What the choice of models and lobes is told; what each part gains: docs/ablation.md."""
+"""Parameters of the choice of models and lobes; what each part gains: docs/ablation.md."""
 
 from dataclasses import dataclass
 
@@ -14,11 +14,11 @@ class FitParams:
     views : int
         Views of each of the `LEVELS.of_object` elements that the fit looks at.
     part_elements : int
-        Elements of a part that its shape alone tells: it is a whole wall, with other things on it. Five phone-made
+        Elements of a part that is found by shape alone: it is a whole wall, with other things on it. Five phone-made
         rooms: models right on .66 of the pixels with 350, on .77 with 1050 (bathroom .47 to .90, office .74 to .88, a
         kitchen .54 to .52).
     looks_like_none : float
-        A metal whose spread is so many times the other's over the views that were fitted is not asked for over all.
+        A metal whose spread over the fitted views is so many times the other's is not compared over all views.
     broadest_phi : float
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface.
     crease : float
@@ -41,23 +41,23 @@ FIT = FitParams()
 
 @dataclass(frozen=True)
 class ChoiceParams:
-    """What it takes to believe in a lobe, or in a metal (`models`).
+    """When a lobe, or a metal, is accepted (`models`).
 
     Attributes
     ----------
     bare : float
         A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times
         what each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1
-        to 1.4, dielectrics and diffuse things whose lobe looked like a metal's 2.4 to 60, there and in four small
+        to 1.4, dielectrics and diffuse objects whose lobe looked like a metal's 2.4 to 60, there and in four small
         rooms.
     min_gain : float
         A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors
-        (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely`: that alone it
-        does not stand or fall with, as it has to do without a diffuse part besides. Below three others of its class
-        decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1. What takes `LEVELS.gain` off
-        need only be likely: few elements show a small highlight, but what they show nothing else explains (a bathroom's
-        tiles: gain .16 at 2.2 standard errors; nothing truly diffuse gained a tenth with less than 3). Not of a handful
-        of elements, whose standard error is no better known than that.
+        (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely` only, as it has
+        to do without a diffuse part besides. Below three others of its class decide: of 31 true metals in nine rooms
+        two had less, a black keyboard 1.9 or 2.1. What takes `LEVELS.gain` off need only be likely: few elements show a
+        small highlight, but what they show nothing else explains (a bathroom's tiles: gain .16 at 2.2 standard errors;
+        nothing truly diffuse gained a tenth with less than 3). Not of a handful of elements, whose standard error is no
+        better known than that.
     """
 
     bare: float = 2.0
@@ -69,7 +69,7 @@ CHOICE = ChoiceParams()
 
 @dataclass(frozen=True)
 class LooksParams:
-    """What it takes to tell a metal or a coat by its looks (`metal-by-looks`, `coat-by-looks` in the ablation).
+    """When a metal or a coat is recognised by appearance (`metal-by-looks`, `coat-by-looks` in the ablation).
 
     Attributes
     ----------
@@ -79,14 +79,14 @@ class LooksParams:
         living room and five others, metals had 0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more,
         but for what `metal_spread` leaves out and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and
         an F0 that no metal has (`metal_by_looks`). Of what was called Lambertian in six rooms and two perturbed scans,
-        fourteen coated things had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); what is truly
-        diffuse had 0.94 and more, but for what `coated_spread` says.
+        fourteen coated objects had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); truly
+        diffuse objects had 0.94 and more, but for what `coated_spread` says.
     metal_spread : float
-        What follows diffuse light as closely as this says nothing against it: errors of E and A are of that size.
+        What follows diffuse light as closely as this may be diffuse: errors of E and A are of that size.
     coated_spread : tuple[float, float]
-        What follows diffuse light as closely as the first says nothing against it (a bath mat: 0.04); what does not
-        follow coated light to the second is not explained (a cord as thick as a pixel: 0.65 diffuse, 0.40 coated; of a
-        table 0.35).
+        What follows diffuse light as closely as the first may be diffuse (a bath mat: 0.04); what does not follow
+        coated light to the second is not explained (a cord as thick as a pixel: 0.65 diffuse, 0.40 coated; of a table
+        0.35).
     """
 
     ratio: float = 0.9
@@ -99,12 +99,12 @@ LOOKS = LooksParams()
 
 @dataclass(frozen=True)
 class GivenParams:
-    """Where an artist gives something of an object, or others of its class do.
+    """Of objects whose model is given by an artist, or by others of the class.
 
     Attributes
     ----------
     sure : float
-        Standard errors that a given model or lobe counts for when others of its class take over what is sure.
+        Standard errors that a given model or lobe counts for when others of its class adopt it.
     """
 
     sure: float = 1000.0
@@ -122,7 +122,7 @@ class IntervalParams:
     groups, roughness_systematic : int, float
         Standard error of Blender's roughness that all elements share; the grid of phi alone has steps of 0.06. Of 24
         glossy objects in eight rendered rooms (`tests/blender/evidence`) the 90 % intervals then hold 22, in the living
-        room 23 of 23; the jackknife alone says 0.02 in the median where 0.07 is true.
+        room 23 of 23; the jackknife alone gives 0.02 in the median where 0.07 is true.
     specular_systematic : float
         The same of log psi: 23 of those 24 are held, in the living room 20 of 23; psi came out between 0.6 and 2.2 of
         the truth.
@@ -131,9 +131,9 @@ class IntervalParams:
     adopted : float
         Standard error of a roughness that was taken over from another object of the class.
     by_looks : float
-        The same of one that follows from how the object looks all over (`one_colour`), which is too broad as a rule: 13
-        metals in three rooms came out -.01 to .25 above the truth (.13 in the root mean square); 3 of 6 in a fourth,
-        rims of spots mixed with their lamps, .5. These intervals hold 16 of the 19.
+        The same of one that is determined by appearance (`one_colour`), which is too broad as a rule: 13 metals in
+        three rooms came out -.01 to .25 above the truth (.13 in the root mean square); 3 of 6 in a fourth, rims of
+        spots mixed with their lamps, .5. These intervals hold 16 of the 19.
     """
 
     groups: int = 6

@@ -1,4 +1,4 @@
-"""The observations of one object made into a fit's problem: elements, views, and the light that they reflect."""
+"""The fitting problem of one object, from its observations: elements, views, and the light that they reflect."""
 
 from collections.abc import Collection
 
@@ -16,22 +16,22 @@ from ...significance import LEVELS
 from .params import FIT
 
 
-def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, least: int, seed: int) -> np.ndarray:
+def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, min_views: int, seed: int) -> np.ndarray:
     """Indices into `samples` of up to `views` views of up to `elements` elements, sorted by element.
 
     Parameters
     ----------
     of_object : (k,) int
         Indices of the object's observations.
-    least : int
+    min_views : int
         Elements with fewer views are left out.
     """
     rng = np.random.default_rng(seed)
-    names, group, count = np.unique(samples.element[of_object], return_inverse=True, return_counts=True)
-    enough = np.flatnonzero(count >= least)
+    ids, group, count = np.unique(samples.element[of_object], return_inverse=True, return_counts=True)
+    enough = np.flatnonzero(count >= min_views)
     if len(enough) > elements:
         enough = rng.choice(enough, elements, replace=False)
-    wanted = np.zeros(len(names), bool)
+    wanted = np.zeros(len(ids), bool)
     wanted[enough] = True
     index, group = of_object[wanted[group]], group[wanted[group]]
     if not len(index):
@@ -60,14 +60,20 @@ class Problems:
         self._field, self._samples = field, samples
         self._threads, self._seed, self._without = threads, seed, without
         self._bright = bright_triangles(field)
-        # A clipped pixel is no value; what is left is sorted by object, so that each object's lies together.
+        # A clipped pixel is no value; the others are sorted by object, so that each object's lies together.
         usable = np.flatnonzero(~samples.saturated)
         owner = field.atlas.object_id[samples.element[usable]]
         order = np.argsort(owner, kind="stable")
         self._owner, self._usable = owner[order], usable[order]
 
     def pick(
-        self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0, smooth: bool = False
+        self,
+        object_id: int,
+        elements: int,
+        views: int,
+        min_views: int = LEVELS.views,
+        seed: int = 0,
+        smooth: bool = False,
     ) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element.
 
@@ -75,14 +81,14 @@ class Problems:
         ----------
         smooth : bool
             Those alone in whose pixels the surface turns by less than a crease does, or the flattest quarter: over a
-            crease a pixel shows two lobes, which no wider one stands for.
+            crease a pixel shows two lobes, which no wider one approximates.
         """
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         index = self._usable[first:last]
         if smooth and len(index) and "pixel-curvature" not in self._without:
             variance = self._samples.normal_variance[index]
             index = index[variance <= max(np.sin(FIT.crease / 2) ** 2, np.quantile(variance, 0.25))]
-        return pick(self._samples, index, elements, views, least, self._seed + seed)
+        return pick(self._samples, index, elements, views, min_views, self._seed + seed)
 
     def light(
         self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX

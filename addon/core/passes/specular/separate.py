@@ -14,12 +14,12 @@ from ...significance import LEVELS
 
 def grouped_median(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Median of (m, 3) values over runs of equal, sorted `group` ((m,) int): the groups and their medians (k, 3)."""
-    names, start, count = np.unique(group, return_index=True, return_counts=True)
-    result = np.empty((len(names), values.shape[1]), values.dtype)
+    groups, start, count = np.unique(group, return_index=True, return_counts=True)
+    result = np.empty((len(groups), values.shape[1]), values.dtype)
     for c in range(values.shape[1]):
         ordered = values[np.lexsort((values[:, c], group)), c]
         result[:, c] = (ordered[start + (count - 1) // 2] + ordered[start + count // 2]) / 2
-    return names, result
+    return groups, result
 
 
 def specular_in_median(samples: Samples, chosen: np.ndarray, lobe: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -39,18 +39,17 @@ def specular_in_median(samples: Samples, chosen: np.ndarray, lobe: np.ndarray) -
         median(I) - median(I - I_nd), not below 0 and not above the median.
     """
     element, radiance = samples.element[chosen], samples.radiance[chosen]
-    names, whole = grouped_median(radiance, element)
+    sampled_elements, median = grouped_median(radiance, element)
     _, diffuse = grouped_median(np.maximum(radiance - lobe, 0), element)
-    return names, np.clip(whole - diffuse, 0, whole).astype(np.float32)
+    return sampled_elements, np.clip(median - diffuse, 0, median).astype(np.float32)
 
 
-def spread_over_object(atlas: Atlas, own: np.ndarray, element: np.ndarray, value: np.ndarray) -> np.ndarray:
+def spread_over_object(atlas: Atlas, object_elements: np.ndarray, element: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Values at some elements of an object carried over to all of it.
 
     Parameters
     ----------
-    own : (n,) int
-        The object's elements.
+    object_elements : (n,) int
     element : (e,) int
         Those where the value is known.
     value : (e, 3) float32
@@ -61,9 +60,9 @@ def spread_over_object(atlas: Atlas, own: np.ndarray, element: np.ndarray, value
         Weighted mean of the nearest known ones, in place and orientation.
     """
     k = min(LEVELS.neighbours, len(element))
-    distance, near = cKDTree(atlas.place(element)).query(atlas.place(own), k=k)
-    distance, near = distance.reshape(len(own), k), near.reshape(len(own), k)
+    distance, neighbours = cKDTree(atlas.place(element)).query(atlas.place(object_elements), k=k)
+    distance, neighbours = distance.reshape(len(object_elements), k), neighbours.reshape(len(object_elements), k)
     # Weights that level off within the neighbourhood: each known value is noisy by itself.
     weight = 1 / (distance + distance[:, -1:] / 2 + 1e-6)
     weight /= weight.sum(1, keepdims=True)
-    return np.einsum("nk,nkc->nc", weight.astype(np.float32), value[near])
+    return np.einsum("nk,nkc->nc", weight.astype(np.float32), value[neighbours])

@@ -1,11 +1,11 @@
-"""What the removal of specular parts is told."""
+"""Parameters of specular removal."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class RemovalParams:
-    """How the specular part is predicted, and when it is believed.
+    """How the specular part is predicted, and when it is accepted.
 
     Attributes
     ----------
@@ -16,7 +16,7 @@ class RemovalParams:
     reach : int
         Pixels, or cells, whose rays are shared: two standard deviations of their weights.
     most : float
-        Times what is left that the specular part may be.
+        Times the remainder that the specular part may be.
     """
 
     rays: int = 8

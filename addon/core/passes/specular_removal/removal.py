@@ -1,4 +1,4 @@
-"""Specular removal: what a fitted lobe shows in a frame is taken out of that frame, and the median is of what is left.
+"""Specular removal: a fitted lobe's radiance is subtracted from each frame, and the median is of the remainder.
 
 Once lobes are known the model I = I_d + I_nd gives every observation its diffuse part. The median of those is L_d where
 most views hold a highlight, too: a floor that mirrors a window from wherever one stands. Differences of medians, spread
@@ -6,8 +6,8 @@ between samples, left such windows white there, and what lies beside them burnt.
 
 I_nd is predicted over whole pictures, by few rays in each pixel; pixels nearby on the same object share theirs. Of a
 large picture one pixel in each cell is traced: no lobe has finer detail for being seen by more pixels. Where I_nd is
-more than what is left, the pixel is taken for a bound, as a clipped one is: it counts where there is no other, and what
-rests on such pixels alone is not measured.
+more than the remainder, the pixel is taken for a bound, as a clipped one is: it counts where there is no other, and
+what rests on such pixels alone is not measured.
 """
 
 import zlib
@@ -41,9 +41,9 @@ class Removed:
     Attributes
     ----------
     specular : (n, 3) float32
-        Part of L_d that is not diffuse; 0 where nothing was asked for.
+        Part of L_d that is not diffuse; 0 for elements that were not requested.
     hidden : (n,) bool
-        In every view the specular part is far more than what is left, and not on most of the object: that is dark.
+        In every view the specular part is far more than the remainder, and not on most of the object: that is dark.
     """
 
     specular: np.ndarray
@@ -66,10 +66,14 @@ class SpecularPart:
     def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], seed: int = 0, rays: int = REMOVAL.rays):
         self._field, self._bright, self._seed, self._rays = field, bright_triangles(field), seed, rays
         self._lobes: dict[int, tuple[float, float, Microfacets]] = {}
-        for m in materials:
-            if m.alpha is None or m.f0 is None or m.model.microfacets is None:
-                raise ValueError(f"{m.name} has no lobe")
-            self._lobes[m.object_id] = float(m.alpha), float(np.mean(m.f0)), m.model.microfacets
+        for material in materials:
+            if material.alpha is None or material.f0 is None or material.model.microfacets is None:
+                raise ValueError(f"{material.name} has no lobe")
+            self._lobes[material.object_id] = (
+                float(material.alpha),
+                float(np.mean(material.f0)),
+                material.model.microfacets,
+            )
 
     def __call__(self, view: FrameView, seed: int) -> np.ndarray:
         """I_nd as a frame sees it, (height, width, 3) float32; 0 where there is no lobe."""
@@ -79,18 +83,18 @@ class SpecularPart:
         rays, result = view.rays.reshape(3, -1), np.zeros((len(element), 3), np.float32)
         step = int(np.ceil(np.sqrt(len(element) / REMOVAL.pixels)))
         for object_id in self._lobes.keys() & set(np.unique(owner).tolist()):
-            # Each object has rays of its own, so that its part is the same whichever others are asked for.
-            at = np.flatnonzero(owner == object_id)
-            place = np.stack(np.divmod(at, view.triangle.shape[1]))
+            # Each object has rays of its own, so that its part is the same whichever others are requested.
+            pixels = np.flatnonzero(owner == object_id)
+            place = np.stack(np.divmod(pixels, view.triangle.shape[1]))
             traced, cell = one_of_each_cell(place, step) if step > 1 else (slice(None), place)
             part = highlight(
-                field, self._bright, element[at[traced]], -rays[:, at[traced]].T, *self._lobes[object_id],
+                field, self._bright, element[pixels[traced]], -rays[:, pixels[traced]].T, *self._lobes[object_id],
                 rays=self._rays, seed=self._seed + seed + object_id,
             )  # fmt: skip
-            result[at] = self._shared(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
+            result[pixels] = self._smoothed(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
         return result.reshape(*view.triangle.shape, 3)
 
-    def _shared(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
+    def _smoothed(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
         """The mean of an object's cells nearby, of one ray's place each, at places ((2, k), in cells): (k, 3) float32.
 
         Parameters
@@ -108,11 +112,11 @@ class SpecularPart:
         reach = REMOVAL.reach
         total = gaussian_filter(planes, reach / 2, axes=(1, 2), mode="constant", radius=reach)
         if place is None:
-            shares = total[:, row, column]
+            sums = total[:, row, column]
         else:
             at = place - low[:, None]
-            shares = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
-        return (shares[:3] / shares[3]).T
+            sums = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
+        return (sums[:3] / sums[3]).T
 
 
 def one_of_each_cell(place: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
@@ -125,8 +129,8 @@ def one_of_each_cell(place: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarr
         Row and column of each cell that holds any, row by row.
     """
     cell, within = np.divmod(place, step)
-    off = np.square(np.indices((step, step)) - (step - 1) / 2).sum(0).ravel()
-    rank = np.argsort(np.argsort(off, kind="stable"))
+    squared_distance = np.square(np.indices((step, step)) - (step - 1) / 2).sum(0).ravel()
+    rank = np.argsort(np.argsort(squared_distance, kind="stable"))
     number = cell[0] * (cell[1].max(initial=0) + 1) + cell[1]
     order = np.argsort(number * step**2 + rank[within[0] * step + within[1]], kind="stable")
     first = order[np.flatnonzero(np.diff(number[order], prepend=-1))]
@@ -137,25 +141,25 @@ def without_specular(
     part: SpecularPart,
     field: LightField,
     lit: LitDiffuse,
-    own: np.ndarray,
+    glossy: np.ndarray,
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
-    **how: Any,
+    **options: Any,
 ) -> Removed:
-    """Take the specular part out of every frame, and the median of what is left.
+    """Subtract the specular part from every frame, and take the median of the remainder.
 
     Parameters
     ----------
     part : SpecularPart
     lit : LitDiffuse
         With the specular part.
-    own : (n,) bool
+    glossy : (n,) bool
         Elements of glossy objects.
     frames : sequence of Frame
         In the poses that `lit` was accumulated with.
     read : callable
         Gives a frame's pixels.
-    **how
+    **options
         As `accumulate` takes it: median, seed, threads, folder, groups, progress.
 
     Raises
@@ -166,17 +170,21 @@ def without_specular(
         From a progress.
     """
 
-    def rest(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
+    def diffuse_part(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
         specular = part(view, zlib.crc32(frame.name.encode()) & 0xFFFFFF)
-        left = pixels.radiance - specular
-        hidden = specular.sum(-1) > REMOVAL.most * left.sum(-1)
-        return replace(pixels, radiance=left, saturated=pixels.saturated | hidden)
+        remainder = pixels.radiance - specular
+        hidden = specular.sum(-1) > REMOVAL.most * remainder.sum(-1)
+        return replace(pixels, radiance=remainder, saturated=pixels.saturated | hidden)
 
-    found = accumulate(field.mesh, field.atlas, field.scene, frames, read, only=own, change=rest, **how)
-    told = own & lit.seen & found.seen
+    diffuse = accumulate(
+        field.mesh, field.atlas, field.scene, frames, read, only=glossy, change=diffuse_part, **options
+    )
+    measured = glossy & lit.seen & diffuse.seen
     radiance = np.nan_to_num(lit.radiance)
-    specular = np.where(told[:, None], radiance - np.maximum(np.nan_to_num(found.radiance), 0), 0).astype(np.float32)
-    hidden, object_id = told & (found.tier == SATURATED), field.atlas.object_id
+    specular = np.where(measured[:, None], radiance - np.maximum(np.nan_to_num(diffuse.radiance), 0), 0).astype(
+        np.float32
+    )
+    hidden, object_id = measured & (diffuse.tier == SATURATED), field.atlas.object_id
     objects = int(object_id.max()) + 1
-    share = np.bincount(object_id, hidden, objects) / np.maximum(np.bincount(object_id, told, objects), 1)
+    share = np.bincount(object_id, hidden, objects) / np.maximum(np.bincount(object_id, measured, objects), 1)
     return Removed(specular, hidden & (share[object_id] <= 0.5))

@@ -14,7 +14,7 @@ from addon.core.light.few_elements import irradiance_at
 from addon.core.light.mirrors import Mirror
 from addon.core.light.openings import CELLS, Openings
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
-from addon.core.passes.clipped_lamps.patches import clipped_patches, told_of
+from addon.core.passes.clipped_lamps.patches import clipped_patches, measured_patches
 from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing, same_lamps
 from addon.core.passes.missing_light.params import MISSING
 from addon.core.passes.missing_light.solve import Unknown, solve
@@ -90,8 +90,8 @@ def test_a_lamp_that_no_frame_clips_is_a_patch_whose_radiance_is_told():
     patches = patches_of(room, shown)
     assert sorted(patches.triangle) == list(range(len(room.mesh.triangles) - 32, len(room.mesh.triangles)))
     apart = replace(room.atlas, object_id=patches.mesh(room.mesh).object_id[room.atlas.triangle])
-    assert told_of(patches.objects, apart, shown) == patches.objects
-    assert told_of(patches.objects, apart, seen(radiance, in_lamp(room).astype(float))) == []
+    assert measured_patches(patches.objects, apart, shown) == patches.objects
+    assert measured_patches(patches.objects, apart, seen(radiance, in_lamp(room).astype(float))) == []
 
 
 def test_sunlight_on_the_floor_is_no_patch():
@@ -172,8 +172,10 @@ def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
     shown = seen(radiance, floor.astype(float))
     patches = patches_of(room, shown)
     mesh = patches.mesh(room.mesh)
-    told = told_of(patches.objects, replace(room.atlas, object_id=mesh.object_id[room.atlas.triangle]), shown)
-    (clipped,) = set(patches.objects) - set(told)
+    measured = measured_patches(
+        patches.objects, replace(room.atlas, object_id=mesh.object_id[room.atlas.triangle]), shown
+    )
+    (clipped,) = set(patches.objects) - set(measured)
     found = find_missing_light(replace(room, mesh=mesh).field(radiance), ~in_lamp(room), [clipped], 0)
     assert not found.lamps
 
