@@ -71,25 +71,25 @@ def _grey(text: str) -> str:
 
 
 def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str, Any]]:
-    """The run that was asked for, `stages` as fields of `Asked`: called with capture, result, settings and progress."""
+    """The requested run, `stages` as fields of `Request`: called with capture, result, settings and progress."""
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
     reading = reading_from(arguments)
     with needed_packages():
-        from ..core.pipeline.run import Asked
+        from ..core.pipeline.run import Request
 
         corrections = {
             "override": arguments.override,
             "heed_kept": not arguments.no_overrides,
             "white": arguments.white,
         }
-        asked = Asked(reading=reading, **corrections, **stages)
-        asked.check(arguments.capture, arguments.out)
+        request = Request(reading=reading, **corrections, **stages)
+        request.check(arguments.capture, arguments.out)
         if arguments.scene:
-            return partial(need("job.run").run, asked=asked)
+            return partial(need("job.run").run, request=request)
         from ..api import run_without_scene
 
-        return partial(run_without_scene, asked=asked, unwrap=arguments.unwrap)
+        return partial(run_without_scene, request=request, unwrap=arguments.unwrap)
 
 
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
