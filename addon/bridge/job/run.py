@@ -14,7 +14,7 @@ from ...core.io.folder import REPORT, SCENE
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
 from ...core.pipeline.refit import Refit, open_result
-from ...core.pipeline.run import WHOLE, Request, Run, package_versions, told_in_a_sentence
+from ...core.pipeline.run import WHOLE, Request, Run, package_versions, storage_errors_as_sentences
 from ...core.progress import Progress
 from ...core.results.overrides import OVERRIDES
 from ...core.results.store import Store
@@ -102,7 +102,7 @@ def refit(
     started = time.monotonic()
     progress.stage(READ)
     result = open_result(folder, objects, override, heed_kept)
-    with Store(folder) as store, told_in_a_sentence(store.folder):
+    with Store(folder) as store, storage_errors_as_sentences(store.folder):
         refitting = Refit(result, store, progress)
         progress.done()
         refitting.refit()

@@ -166,7 +166,7 @@ class Run:
             One is to be done alone, and what comes before is not stored.
         """
         store, request = self._store, self._request
-        with told_in_a_sentence(self.folder):
+        with storage_errors_as_sentences(self.folder):
             if request.block is None:
                 write_capture(store.folder, self.capture.root)
                 if request.from_stage in STAGES:
@@ -198,7 +198,7 @@ class Run:
         """Write images, materials.json and the page, what an interface needs, then the scene and report.json."""
         recovery, store = self.recovery, self._store
         recovery.store = store
-        with told_in_a_sentence(self.folder):
+        with storage_errors_as_sentences(self.folder):
             self._progress.stage(WRITE)
             started = time.monotonic()
             recovery.look_closer()
@@ -249,7 +249,7 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
 
 
 @contextmanager
-def told_in_a_sentence(folder: Path) -> Iterator[None]:
+def storage_errors_as_sentences(folder: Path) -> Iterator[None]:
     """Turn the system's errors while `folder` is written into a `StorageError`, one sentence long."""
     try:
         yield
