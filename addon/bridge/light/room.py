@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.errors import BadInputError
 from ...core.luminance import LUMINANCE
 from ...core.photo import MIDDLE_GREY
@@ -128,7 +128,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     stored = scene.get(ROOM_LIGHT)
     if stored:
         return float(stored)
-    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / USUAL_ALBEDO
+    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / TYPICAL_ALBEDO
     scene[ROOM_LIGHT] = irradiance
     return irradiance
 

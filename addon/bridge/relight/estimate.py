@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.scene.sphere import fibonacci
 from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
@@ -94,8 +94,8 @@ def measure_in_steps(scene: bpy.types.Scene) -> Iterator[None]:
                 direct.append(_irradiance(scene, source, point, normal))
                 yield
             indirect = _mean_irradiance(scene, key, cache.areas, direct[cache.visible_count :])
-            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect * USUAL_ALBEDO / (
-                1 - USUAL_ALBEDO
+            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect * TYPICAL_ALBEDO / (
+                1 - TYPICAL_ALBEDO
             )
     cache.irradiances = irradiances
     _caches[scene.name] = cache
