@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import barely_seen, evened
+from ..light.few_elements import barely_seen, filled_radiance
 from ..light.field import LightField
 from ..light.lamps import Lamp, LampKinds, lamp_kinds
 from ..light.mirrors import Mirror, known_mirror
@@ -318,7 +318,7 @@ def with_found_light(
     measured: list[int],
 ) -> tuple[LightField, Light]:
     """The room with the light found `missing`; `measured` are the patches whose radiance the frames show."""
-    radiance = evened(dark)
+    radiance = filled_radiance(dark)
     for object_id, solved in missing.radiance.items():
         of_object = dark.atlas.object_id == object_id
         radiance[of_object] = np.maximum(radiance[of_object], solved)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
-from ...light.few_elements import barely_seen, evened, from_sun, irradiance_at, most_reflected, pick, steady
+from ...light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, most_reflected, pick, steady
 from ...light.field import LightField
 from ...light.lamps import Lamp, LampKinds, find_seen, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
@@ -133,8 +133,8 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    dark, evened_radiance, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
-    received = previous.received if previous else irradiance_at(unlit.with_light(evened_radiance, known), element, seed)
+    dark, room_radiance, unlit = np.zeros_like(field.radiance), filled_radiance(field), field.with_sun(None)
+    received = previous.received if previous else irradiance_at(unlit.with_light(room_radiance, known), element, seed)
     sky_contributions = (
         previous.sky
         if previous
@@ -179,7 +179,7 @@ def find_light(
             zip(groups, contributions(field, sample.element, list(groups.values()), seed).T, strict=True)
         )
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-        lit_room = field.with_light(evened_radiance, environment)
+        lit_room = field.with_light(room_radiance, environment)
         least = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
@@ -230,7 +230,7 @@ def as_shown(lamp: Lamp, field: LightField) -> Lamp:
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     """L_d with the radiance of lamps put in, and its object's where nobody saw an element, (n, 3) float32."""
-    radiance = evened(field)
+    radiance = filled_radiance(field)
     for lamp in lamps:
         radiance[field.atlas.elements_of(lamp.object_id)] = lamp.radiance
     return radiance

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...light.environment import Environment
-from ...light.few_elements import evened, irradiance_at
+from ...light.few_elements import filled_radiance, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
@@ -22,7 +22,7 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     contribution = irradiance_at(dark, element, seed)[:, 0]
     if contribution.mean() < SKY.least_share * np.pi:
         return field, ()
-    received = irradiance_at(field.with_light(evened(field)), element, seed)
+    received = irradiance_at(field.with_light(filled_radiance(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     usable = np.ones(len(element), bool)
     fit = None
