@@ -47,7 +47,7 @@ def needed(
     sure = [lamp for lamp in lamps if lamp.object_id in shining]
     if not sky.contribution or len(sure) == len(lamps):
         return lamps, sky
-    alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
+    alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.measured)
     for _ in range(UNSEEN.sweeps):
         solve_sky(sample, sure, contribution, alone, base)
     sent = log_of(sample.radiance @ LUMINANCE)

@@ -182,7 +182,7 @@ def find_light(
         lit_room = field.with_light(room_radiance, environment)
         least = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
-    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
+    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
     certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
         lamps = solve_lamps(sample, contribution, least, kinds, kin, seen, sky, received[lit])
