@@ -308,12 +308,12 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
 
     def state(self, context, objects):
         hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
-        if hit is None or not corrections.correctable(hit.thing):
+        if hit is None or not corrections.correctable(hit.obj):
             raise BadInputError("There is no recovered object at that spot; click on one.")
-        albedo = known_white.of_object(hit.thing, hit.place, tuple(self.albedo), depsgraph_of(context.scene))
-        corrections.say_white(hit.thing, albedo)
-        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.thing.name}'")
-        return [hit.thing]
+        albedo = known_white.of_object(hit.obj, hit.location, tuple(self.albedo), depsgraph_of(context.scene))
+        corrections.say_white(hit.obj, albedo)
+        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.obj.name}'")
+        return [hit.obj]
 
     def _end(self, context) -> None:
         self._picking = False

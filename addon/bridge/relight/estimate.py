@@ -120,16 +120,16 @@ def _rounded_pose(obj) -> tuple:
 def _sample_points(scene) -> tuple[list, int, np.ndarray]:
     """Points, visible count and areas of a `ViewCache`; no point is on a lamp."""
     rays = [picture_ray(scene, *place) for place in PICTURE]
-    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
+    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.obj)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):
         for direction in map(Vector, fibonacci(_ROOM_RAYS)):
             hit = cast(scene, start, direction)
-            if hit is not None and not _is_lamp(hit.thing):
+            if hit is not None and not _is_lamp(hit.obj):
                 hits.append(hit)
                 areas.append(hit.distance**2 / max(-hit.normal.dot(direction), 0.2))
     return (
-        [(hit.place + 1e-3 * hit.normal, hit.normal) for hit in hits],
+        [(hit.location + 1e-3 * hit.normal, hit.normal) for hit in hits],
         visible_count,
         np.array(areas) * 2 * math.pi / _ROOM_RAYS,
     )

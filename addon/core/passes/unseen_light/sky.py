@@ -46,7 +46,9 @@ class Sky:
         guess = np.maximum(self.guess[i], 1e-12)
         if self.clipped[i]:
             return guess, SKY.above * guess
-        return guess / (UNSEEN.darker if self.measured[i] else LIGHT_FIT.reach), np.full(3, LIGHT_FIT.reach * guess.max())
+        return guess / (UNSEEN.darker if self.measured[i] else LIGHT_FIT.reach), np.full(
+            3, LIGHT_FIT.reach * guess.max()
+        )
 
     def without(self, parts: Collection[int]) -> Sky:
         """The other parts, at the radiance that they have."""
