@@ -20,7 +20,7 @@ from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
 from ...core.io.ply import ply_bytes
-from ...core.scene.lenses_told import told_lens
+from ...core.scene.lens_json import lens_to_json
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
 from ..refused import MAX_TOLD, sentences, whole_folder
@@ -152,7 +152,7 @@ def _write(
         frame = {"file_path": file_path, "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy}
         frame |= {"cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
         if camera.lens is not None:
-            frame[OWN_LENS] = told_lens(camera.lens)
+            frame[OWN_LENS] = lens_to_json(camera.lens)
         frames.append(frame | view.properties)
     _write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     entries = [
