@@ -13,7 +13,7 @@ import bpy
 
 from ...core.atomic import write_bytes
 from ...core.brdf.dielectric import DIELECTRIC
-from ...core.brdf.registry import shown
+from ...core.brdf.registry import find_or_lambertian
 from ...core.errors import BadInputError
 from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
@@ -133,7 +133,7 @@ def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[s
     previous_model = values["model"]
     values |= copied
     values |= {key: override[key] for key in (*LOBE, "base_color") if key in override}
-    model = shown(values["model"])
+    model = find_or_lambertian(values["model"])
     if "model" not in override and {"f0", "roughness"} & override.keys() and model.has_albedo and not model.has_lobe:
         model = DIELECTRIC
         values["model"] = model.name

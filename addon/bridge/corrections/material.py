@@ -11,7 +11,7 @@ import bpy
 
 from ...core.brdf.compensation import ior_of
 from ...core.brdf.lambertian import LAMBERTIAN
-from ...core.brdf.registry import shown
+from ...core.brdf.registry import find_or_lambertian
 from ...core.results.overrides import LOBE
 from ..data.materials import (
     BASE_COLOR,
@@ -98,7 +98,7 @@ def show(obj: bpy.types.Object, values: dict[str, Any]) -> None:
     if values == original:
         del material[WORN]
         return
-    inputs, model = principled(material).inputs, shown(values["model"])
+    inputs, model = principled(material).inputs, find_or_lambertian(values["model"])
     if values["model"] != original["model"]:
         inputs[METALLIC].default_value = float(model.lobe_alone)
         inputs[SPECULAR_LEVEL].default_value = 0.5 if model.has_lobe else 0.0

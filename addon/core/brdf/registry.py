@@ -51,8 +51,8 @@ def origin(model: Brdf) -> str:
     return _packages.get(model.name) or " ".join(filter(None, map(package_of, (model, model.microfacets))))
 
 
-def shown(name: str | None) -> Brdf:
-    """The model of a name as interfaces show it: `LAMBERTIAN` where its package is not there."""
+def find_or_lambertian(name: str | None) -> Brdf:
+    """The model of a name, for display: `LAMBERTIAN` where its package is not installed."""
     return find(name) or LAMBERTIAN
 
 
