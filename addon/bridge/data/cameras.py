@@ -137,7 +137,7 @@ def size_warning(frames: Iterable[Frame]) -> str:
     )
 
 
-def kept_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
+def stored_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
     """The lens that `make_cameras` left with a camera, and its fx, fy, cx, cy; None where it left none."""
     try:
         lens, pixels = json.loads(camera[LENS])
