@@ -28,17 +28,17 @@ def too_large(stored: int, size: int) -> bool:
     return stored > max(LARGE[0], LARGE[1] * size)
 
 
-def check_claim(path: Path, width: int, height: int, stored: int, most: float = math.inf) -> None:
+def check_claim(path: Path, width: int, height: int, stored: int, max_stored: float = math.inf) -> None:
     """Raise `BadInputError` where a picture's header claims too much, before room for any pixel is made.
 
     Parameters
     ----------
     stored : int
         Bytes that its pixels take.
-    most : float
+    max_stored : float
         Bytes of pixels that such a file can hold, where its format tells.
     """
-    if not 0 < width * height <= MAX_PIXELS or stored > most or too_large(stored, path.stat().st_size):
+    if not 0 < width * height <= MAX_PIXELS or stored > max_stored or too_large(stored, path.stat().st_size):
         raise BadInputError(
             f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write or copy it again."
         )
@@ -67,8 +67,8 @@ def turn(pixels: np.ndarray, orientation: int) -> np.ndarray:
     """
     if orientation > 4:
         pixels = pixels.swapaxes(0, 1)
-    down, right = signs(orientation)
-    return pixels[::down, ::right]
+    row_step, column_step = signs(orientation)
+    return pixels[::row_step, ::column_step]
 
 
 def signs(orientation: int) -> tuple[int, int]:

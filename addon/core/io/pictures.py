@@ -110,7 +110,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         rgb = read_raw(path).rgb
         return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
     if not transfer and picture_bits(path):
-        raise BadInputError(unstated(path))
+        raise BadInputError(unstated_curve(path))
     colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
     if turned:
         orientation = picture_orientation(path)
@@ -123,7 +123,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, profile_to_rec709(profile))
 
 
-def unstated(path: Path) -> str:
+def unstated_curve(path: Path) -> str:
     """The sentence on a picture of codes whose curve nobody told."""
     return (
         f"Picture '{path}' holds 8 or 16-bit codes among frames of floats; make all frames alike, or give the codes' "
