@@ -1,4 +1,4 @@
-"""A benchmark's table: what was run, how wrong it was, what it cost. As CSV in full precision, as Markdown rounded."""
+"""A benchmark's table: runs, their errors and costs. CSV in full precision, Markdown rounded."""
 
 import csv
 import io
@@ -80,7 +80,7 @@ def _line(cells) -> str:
 
 
 def shown(cell: Cell) -> str:
-    """A cell for people: '0.0123', '1.2e-05', '12345', 'yes'."""
+    """A cell as readable text: '0.0123', '1.2e-05', '12345', 'yes'."""
     if cell is None or cell is False:
         return ""
     if cell is True:

@@ -18,7 +18,7 @@ UNTOLD: Workload[float] = 0.5
 
 @dataclass(frozen=True)
 class MaterialScores:
-    """How right the materials are.
+    """How well the materials match the truth.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 
 def compare(capture, arguments: argparse.Namespace) -> dict:
-    """Whether frames and mesh fit, ready for JSON; writes the overlay where one is wanted."""
+    """Whether frames and mesh fit, ready for JSON; writes the overlay if its path was given."""
     with needed_packages():
         from ..core.agreement.look import look
         from ..core.agreement.overlay import overlay

@@ -1,4 +1,4 @@
-"""The command `recover`: its options, how a capture is read, with a scene or without."""
+"""The command `recover`: its options, and the run with Blender or without."""
 
 import argparse
 import re
@@ -50,7 +50,7 @@ def add_recover(commands) -> None:
 
 
 def add_home(parser: argparse.ArgumentParser) -> None:
-    """How the result is made: with Blender or without, and with what is known of objects."""
+    """Add the options on how the result is made: with Blender or without, and with what is known of objects."""
     scene = "also write scene.blend, which takes Blender's bpy (default yes)"
     parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
     layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
@@ -64,7 +64,7 @@ def add_home(parser: argparse.ArgumentParser) -> None:
 
 
 def _grey(text: str) -> str:
-    """The text of `--grey`, which `--white` would take as well, if it names a pixel."""
+    """Check that the text of `--grey` names a pixel, and return it: `--white` takes it as well."""
     if not re.fullmatch(r".+:\s*\d+\s*,\s*\d+\s*(=.*)?", text):
         raise argparse.ArgumentTypeError(f"'{text}' names no pixel; give FRAME:X,Y or FRAME:X,Y=ALBEDO")
     return text

@@ -1,4 +1,4 @@
-"""The farm's commands: `stage` is a unit of work; `plan`, `submit` and `status` are about rooms of them."""
+"""The farm's commands: `stage` does one unit of work; `plan`, `submit` and `status` handle whole rooms."""
 
 import argparse
 import json
@@ -101,7 +101,7 @@ def _block(text: str) -> tuple[int, int]:
 
 
 def options_of(arguments: argparse.Namespace) -> list[str]:
-    """The options of a unit of work that say the same as `arguments`; paths in them are absolute."""
+    """The options that pass `arguments` on to a unit of work; paths in them are absolute."""
     given = [f"--preset={arguments.preset}"]
     for info in setting_infos():
         value, option = getattr(arguments, info.name), info.name.replace("_", "-")

@@ -26,7 +26,7 @@ NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."
 
 
 def _ask(address: str, path: str, content: dict[str, Any] | None = None) -> Any:
-    """The manager's answer; LookupError where it knows no such way."""
+    """Send a request to the manager and return its answer, parsed JSON; raises LookupError on status 404."""
     data = None if content is None else json.dumps(content).encode()
     headers = {"Content-Type": "application/json", "Accept": "application/json"}
     try:

@@ -1,4 +1,4 @@
-"""The graph of a room's units of work: what every engine is given in its own language."""
+"""The graph of a room's units of work, which each engine is given in its own format."""
 
 import json
 import shlex
@@ -44,13 +44,13 @@ class Room:
     capture, result : Path
         Absolute, as the workers find them.
     blocks : int
-        Into how many a stage is divided that can be.
+        Number of blocks into which a stage is divided, if it can be.
     program : tuple of str
-        What runs a command of ours on a worker.
+        Command that starts Scan Relight on a worker.
     options : tuple of str
         The options of each unit: settings, how the capture is read.
     divided : tuple of str
-        The stages that are, by blocks.
+        The stages that are divided into blocks.
     """
 
     capture: Path
@@ -62,12 +62,12 @@ class Room:
 
     @property
     def name(self) -> str:
-        """What the room is called."""
+        """Name of the room."""
         return self.result.name
 
     @property
     def farm(self) -> Path:
-        """Where the plan, locks, marks and logs are."""
+        """Folder of the plan, locks, marks and logs."""
         return self.result / FOLDER
 
     def tasks(self) -> tuple[Task, ...]:
@@ -117,7 +117,7 @@ class Room:
 
 
 def unit_name(stage: str, block: tuple[int, int] | None) -> str:
-    """What a unit of work is called."""
+    """Name of a unit of work."""
     return f"{stage}-{block[0]}-of-{block[1]}" if block else stage
 
 
@@ -147,9 +147,9 @@ def rooms_from(
     Parameters
     ----------
     captures : list of Path
-        Their result folders are called as they are, below `results`.
+        Their result folders have the same names, in `results`.
     listed : Path, optional
-        File with a capture in each line, and behind a tab its result folder, if it is another.
+        File with a capture in each line, followed by a tab and its result folder if that is not the default.
     program : str
         As a shell would split it.
 

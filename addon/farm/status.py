@@ -1,4 +1,4 @@
-"""How far rooms are, read off the marks and locks in their result folders; no capture is read, no clock is asked."""
+"""Progress of rooms, from the marks and locks in their result folders; reads no capture and no clock."""
 
 import html
 import json
@@ -22,7 +22,7 @@ PAGE = "report.html"
 
 @dataclass(frozen=True)
 class UnitState:
-    """A unit of work: its name, its state, who does it or did, its time, memory and error."""
+    """A unit of work: name, state, the machine that does it or did, time, memory and error."""
 
     name: str
     stage: str
@@ -35,7 +35,7 @@ class UnitState:
 
 @dataclass(frozen=True)
 class RoomState:
-    """A room: its result folder, its state, the stage that it is in, the share that is done, and its units."""
+    """A room: result folder, state, current stage, share that is done, and units."""
 
     result: Path
     state: str
@@ -52,7 +52,7 @@ class RoomState:
 
 
 def look(result: Path) -> RoomState:
-    """How far a room is; a folder without a plan is no error."""
+    """The progress of a room; a folder without a plan is no error."""
     try:
         plan = json.loads((result / FOLDER / "plan.json").read_text(encoding="utf-8"))
         named = [(str(task["name"]), str(task["stage"])) for task in plan["tasks"]]
@@ -104,7 +104,7 @@ def table(rooms: list[RoomState]) -> str:
 
 
 def page(rooms: list[RoomState], folder: Path) -> str:
-    """An HTML page over all rooms, which lies in `folder`: it names the rooms' pages by their way from there."""
+    """An HTML page over all rooms, which lies in `folder`: it links to the rooms' pages by relative paths."""
     body = []
     for room in rooms:
         name, page_path = html.escape(room.result.name), room.result.absolute() / PAGE
