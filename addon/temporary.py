@@ -17,7 +17,7 @@ from typing import IO
 
 NAME = "scan_relight_run_"
 LOCK = "lock"
-ASKED = ("TMPDIR", "TEMP", "TMP")
+VARIABLES = ("TMPDIR", "TEMP", "TMP")
 """Where programs look for the folder of temporary files."""
 
 
@@ -36,7 +36,7 @@ class RunFolder:
     @property
     def environment(self) -> dict[str, str]:
         """What a process is to find, so that its temporary files lie there."""
-        return {} if self.path is None else dict.fromkeys(ASKED, str(self.path))
+        return {} if self.path is None else dict.fromkeys(VARIABLES, str(self.path))
 
     def close(self) -> None:
         if self._lock is not None:

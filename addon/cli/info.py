@@ -78,15 +78,15 @@ def compare(capture, arguments: argparse.Namespace) -> dict:
         from ..core.io.pixels import read_pixels
         from ..core.io.png import png
 
-        found = look(capture, read_pixels, search=not arguments.convention)
+        fit = look(capture, read_pixels, search=not arguments.convention)
         if arguments.overlay is not None:
-            columns = [Convention()] + ([found.best.convention] if found.best else [])
+            columns = [Convention()] + ([fit.best.convention] if fit.best else [])
             write_bytes(arguments.overlay, png(overlay(capture, read_pixels, columns)))
     return {
-        "fits": found.fits,
-        "quality": found.as_read.quality,
-        "hit": found.as_read.hit,
-        "convention": str(found.best.convention) if found.best else None,
-        "misaligned_pixels": found.misaligned.round(3).tolist(),
-        "sentences": found.sentences(),
+        "fits": fit.fits,
+        "quality": fit.as_read.quality,
+        "hit": fit.as_read.hit,
+        "convention": str(fit.best.convention) if fit.best else None,
+        "misaligned_pixels": fit.misaligned.round(3).tolist(),
+        "sentences": fit.sentences(),
     }

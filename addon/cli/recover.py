@@ -44,12 +44,12 @@ def add_recover(commands) -> None:
     add("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE, help=last)
     anew = "do this stage and all later ones anew, though they are stored"
     add("--from-stage", metavar="STAGE", choices=RUN_STAGES, help=anew)
-    add_home(parser)
+    add_result_options(parser)
     add_settings(parser)
     add_common(parser, recover_command, leash=True)
 
 
-def add_home(parser: argparse.ArgumentParser) -> None:
+def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Add the options on how the result is made: with Blender or without, and with what is known of objects."""
     scene = "also write scene.blend, which takes Blender's bpy (default yes)"
     parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)

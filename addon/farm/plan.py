@@ -135,7 +135,7 @@ def make_folder(folder: Path) -> None:
 
 def rooms_from(
     captures: list[Path],
-    listed: Path | None,
+    list_file: Path | None,
     results: Path,
     blocks: int,
     program: str,
@@ -148,7 +148,7 @@ def rooms_from(
     ----------
     captures : list of Path
         Their result folders have the same names, in `results`.
-    listed : Path, optional
+    list_file : Path, optional
         File with a capture in each line, followed by a tab and its result folder if that is not the default.
     program : str
         As a shell would split it.
@@ -160,23 +160,23 @@ def rooms_from(
     """
     if blocks < 1:
         raise BadInputError(f"A stage can't be divided into {blocks} blocks; give 1 or more.")
-    wanted = [(capture, results / capture.absolute().name) for capture in captures]
-    if listed is not None:
+    folders = [(capture, results / capture.absolute().name) for capture in captures]
+    if list_file is not None:
         try:
-            lines = listed.read_text(encoding="utf-8").splitlines()
+            lines = list_file.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            raise BadInputError(f"List of rooms '{listed}' can't be read ({error}); give a text file.") from error
+            raise BadInputError(f"List of rooms '{list_file}' can't be read ({error}); give a text file.") from error
         for line in filter(str.strip, lines):
             capture, _, result = line.partition("\t")
-            folder = listed.parent / capture.strip()
-            wanted.append(
-                (folder, listed.parent / result.strip() if result.strip() else results / folder.absolute().name)
+            folder = list_file.parent / capture.strip()
+            folders.append(
+                (folder, list_file.parent / result.strip() if result.strip() else results / folder.absolute().name)
             )
-    if not wanted:
+    if not folders:
         raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
     command = tuple(shlex.split(program)) or (PROGRAM,)
     shared = blocks, command, tuple(options), divided
-    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in wanted]
+    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in folders]
     taken: dict[Path, Path] = {}
     for room in rooms:
         if room.result.resolve() == room.capture.resolve():

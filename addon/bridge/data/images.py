@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.brdf.material import ObjectMaterial
 from ...core.errors import BadInputError
-from ...core.naming import LONGEST, cut
+from ...core.naming import MAX_LENGTH, cut
 from ...core.results.room_file import MATERIALS, layout_of
 from ..marks import IMAGE, LAYOUT, UV_MAP
 from .mesh_objects import PARTS_UV
@@ -93,7 +93,7 @@ def load_parts(
 def image_name(room: str, path: Path | str) -> str:
     """Blender's name for an image file of a room: 'kitchen base color', to distinguish two rooms in one file."""
     label = Path(path).stem.replace("_", " ")
-    return f"{cut(room, LONGEST - 8) or 'room'} {label}"
+    return f"{cut(room, MAX_LENGTH - 8) or 'room'} {label}"
 
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:

@@ -24,7 +24,7 @@ from .traj import TO_OPENGL
 
 VIDEO, POSES, MATRIX = "rgb.mp4", "odometry.csv", "camera_matrix.csv"
 POSE, LENS = ("qx", "qy", "qz", "qw", "x", "y", "z"), ("fx", "fy", "cx", "cy")
-LONGEST: Limit[int] = 1 << 22
+MAX_FRAMES: Limit[int] = 1 << 22
 """Frames of 19 hours."""
 OFF_CENTRE: Limit[float] = 0.1
 """How far a phone's principal point may lie from the middle, as a share of a side; it lies within 0.02."""
@@ -79,7 +79,7 @@ def _rows(root: Path) -> dict[int, dict[str, float]]:
         whole = dict(zip(LENS, (matrix[k] for k in (0, 4, 2, 5)))) if len(matrix) == 9 else {}
     rows = [whole | dict(zip(head, map(_number, line))) for line in lines]
     numbered = ((row.get("frame", float(i)), row) for i, row in enumerate(rows))
-    by_number = {int(number): row for number, row in numbered if 0 <= number < LONGEST}
+    by_number = {int(number): row for number, row in numbered if 0 <= number < MAX_FRAMES}
     if not set(POSE) <= set(head) or not by_number:
         raise BadInputError(f"'{root / POSES}' lists no poses ({', '.join(POSE)}); export the recording again.")
     return by_number
