@@ -17,11 +17,7 @@ LONGEST: Shown[int] = 2000
 def one_line(sentence: str) -> str:
     """The sentence as a console can show it: names in it may hold line breaks and what is no character at all."""
     printable = "".join(c if c.isprintable() else "\ufffd" for c in sentence)
-    return (
-        printable
-        if len(printable) <= LONGEST
-        else f"{printable[: LONGEST // 2]} ... {printable[-LONGEST // 2 :]}"
-    )
+    return printable if len(printable) <= LONGEST else f"{printable[: LONGEST // 2]} ... {printable[-LONGEST // 2 :]}"
 
 
 class ScanRelightError(Exception):

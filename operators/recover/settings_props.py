@@ -8,7 +8,7 @@ from functools import cache
 import bpy
 
 from ...addon.bridge.job.command import command
-from ...addon.bridge.results import home
+from ...addon.bridge.results import default_folders
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError
 from ...addon.core.settings import PRESETS, Settings
@@ -160,7 +160,7 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
             raise BadInputError(f"Choose the {name.replace('_', ' ')} first.")
         folder = bpy.path.abspath(value)
         if name == "result_folder":
-            home.check(folder)
+            default_folders.check(folder)
         return folder
 
 

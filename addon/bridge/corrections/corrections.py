@@ -17,7 +17,7 @@ from ...core.brdf.registry import find_or_lambertian
 from ...core.errors import BadInputError
 from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
-from ...core.results.place import write_capture
+from ...core.results.result_folders import write_capture
 from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own

@@ -20,7 +20,7 @@ from ..memory import peak_memory
 from ..progress import Progress, ProgressEvent
 from ..results.known_white import white_of
 from ..results.overrides import OVERRIDES, Overrides, heeded, merge
-from ..results.place import write_capture
+from ..results.result_folders import write_capture
 from ..results.room_file import ROOM, objects_of, write_room
 from ..results.store import Store
 from ..scene.model import Capture
