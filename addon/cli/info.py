@@ -51,16 +51,19 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
     lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
     print(f"{facts['capture']} ({facts['format']})", file=stream)
-    told = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
-    print(f"  frames     {facts['frames']}{told}", file=stream)
+    details = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
+    print(f"  frames     {facts['frames']}{details}", file=stream)
     print(
         f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
         f"{extent} m",
         file=stream,
     )
     print(f"  instances  {len(facts['instances'])}", file=stream)
-    for one in facts["instances"]:
-        print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
+    for instance in facts["instances"]:
+        print(
+            f"    {instance['object_id']:>5}  {instance['class_name']:<24} {instance['triangles']:>8} triangles",
+            file=stream,
+        )
     for warning in facts["warnings"]:
         print(f"  warning    {warning}", file=stream)
     for sentence in facts.get("agreement", {}).get("sentences", ()):

@@ -112,7 +112,7 @@ def find_shading(
 def with_patches_of(shading: Shading, patches: Patches) -> Shading:
     """A `Shading` found with `patches` set apart: those that are no lamps or mirrors go back to their objects."""
     mirrors = {mirror.object_id for mirror in shading.mirrors}
-    chosen, number = patches.kept(set(patches.objects) & (shading.emitters | mirrors))
+    chosen, number = patches.subset(set(patches.objects) & (shading.emitters | mirrors))
 
     def renumbered(sources: Any) -> tuple:
         return tuple(replace(source, object_id=number.get(source.object_id, source.object_id)) for source in sources)
