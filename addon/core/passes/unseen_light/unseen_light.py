@@ -39,7 +39,7 @@ class Contributions:
         Those of the sample that tell of lamps.
     lamps : dict of (k,) float64
         E there at radiance 1 from each unseen object, and from those of its model (`LampKinds`).
-    least : dict of float
+    min_luminance : dict of float
         Luminance below which each would be no lamp.
     """
 
@@ -47,7 +47,7 @@ class Contributions:
     sky: list[np.ndarray]
     element: np.ndarray
     lamps: dict[int, np.ndarray]
-    least: dict[int, float]
+    min_luminance: dict[int, float]
 
 
 @dataclass(frozen=True)
@@ -173,19 +173,19 @@ def find_light(
         groups = {i: groups[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
     earlier = previous if previous is not None and np.array_equal(previous.element, sample.element) else None
     if earlier is not None:
-        contribution, least = earlier.lamps, earlier.least
+        contribution, min_luminance = earlier.lamps, earlier.min_luminance
     else:
         contribution = dict(
             zip(groups, contributions(field, sample.element, list(groups.values()), seed).T, strict=True)
         )
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(room_radiance, environment)
-        least = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
+        min_luminance = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
     certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, kinds, kin, seen, sky, received[lit])
+        lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received[lit])
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], certain)
     lamps = [
@@ -201,7 +201,7 @@ def find_light(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = bright_all_over(field, element, irradiance)
-    reusable = Contributions(sunless, sky_contributions, sample.element, contribution, least)
+    reusable = Contributions(sunless, sky_contributions, sample.element, contribution, min_luminance)
     notes = sky_notes + tuple(sky.notes())
     return Light(tuple(sure) + tuple(lamps), environment, notes, element, irradiance, reusable, mixed)
 

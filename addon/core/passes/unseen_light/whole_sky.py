@@ -44,11 +44,11 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     if len(solved) == 3:
         radiance = np.array(solved)
     # No object reflects more than it gets.
-    least = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
+    floor = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
         :, None
     ]
     for number in np.unique(sample.object_id):
-        radiance = np.maximum(radiance, np.median(least[object_id[usable] == number], 0))
+        radiance = np.maximum(radiance, np.median(floor[object_id[usable] == number], 0))
     note = (
         "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
         f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "
