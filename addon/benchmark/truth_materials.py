@@ -12,7 +12,7 @@ from ..core.kinds import Workload
 
 MIN_PIXELS: Workload[int] = 100
 """In the held-out views, that an object is judged by."""
-UNTOLD: Workload[float] = 0.5
+DEFAULT_ROUGHNESS: Workload[float] = 0.5
 """Blender's Roughness where the result says none."""
 
 
@@ -59,7 +59,7 @@ def found_roughness(material: ObjectMaterial) -> float | None:
 def written_roughness(material: ObjectMaterial) -> float:
     """sqrt(alpha), Blender's own where none was found."""
     roughness = found_roughness(material)
-    return UNTOLD if roughness is None else roughness
+    return DEFAULT_ROUGHNESS if roughness is None else roughness
 
 
 def true_roughness(entry: Mapping[str, Any]) -> float | None:

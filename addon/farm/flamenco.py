@@ -17,7 +17,7 @@ SCRIPT = Path(__file__).parent / "scan_relight.js"
 JOB_TYPE: Code[str] = "scan-relight"
 """What the manager makes of the script's name."""
 MANAGER: Code[str] = "http://localhost:8080/"
-SECONDS: Shown[float] = 30.0
+TIMEOUT: Shown[float] = 30.0
 """How long the manager may take for an answer."""
 PATHS = ("mesh", "exposures", "override")
 MAX_ANSWER_BYTES: Shown[int] = 1 << 24
@@ -33,7 +33,7 @@ def _send(address: str, path: str, content: dict[str, Any] | None = None) -> Any
         if urllib.parse.urlsplit(address).scheme not in ("http", "https"):
             raise BadInputError(f"'{address}' is no manager's address; give --manager as {MANAGER}.")
         request = urllib.request.Request(urllib.parse.urljoin(address.rstrip("/") + "/", path), data, headers)
-        with urllib.request.urlopen(request, timeout=SECONDS) as answer:
+        with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
             return json.loads(answer.read(MAX_ANSWER_BYTES))
     except urllib.error.HTTPError as error:
         with error:

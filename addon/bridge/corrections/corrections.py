@@ -122,7 +122,7 @@ def by_id(obj: bpy.types.Object, object_id: int) -> bpy.types.Object | None:
 
 
 def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:
-    """The values found of an object (`material.found`), overridden by those given."""
+    """The values recovered of an object (`material.recovered_values`), overridden by those given."""
     override = given(obj)
     source = by_id(obj, override["same_as"]) if override.get("same_as") is not None else None
     copied = {}
@@ -152,7 +152,7 @@ def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[s
 
 def _base_values(obj: bpy.types.Object, override: dict, model: str | None) -> dict[str, Any]:
     """The values that an override replaces: fitted by the run to that model, else found before one was given."""
-    original, worn = material.found(obj), material.worn(obj)
+    original, worn = material.recovered_values(obj), material.worn(obj)
     if worn["model"] != (model or original["model"]):
         return original
     withdrawn = (entry(obj).get("given") or {}).keys() - override.keys()  # given to the run, and not any more
@@ -164,7 +164,7 @@ def show(obj: bpy.types.Object) -> None:
     if correctable(obj):
         with our_own(material.worn_material(obj)):
             material.show(obj, effective(obj))
-        if not given(obj) and material.found(obj) == material.worn(obj):
+        if not given(obj) and material.recovered_values(obj) == material.worn(obj):
             obj.pop(FOUND, None)
 
 

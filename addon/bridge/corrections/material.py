@@ -53,8 +53,8 @@ def entry(obj: bpy.types.Object) -> dict[str, Any]:
     return file.rows([obj]).get(obj, {})
 
 
-def found(obj: bpy.types.Object) -> dict[str, Any]:
-    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
+def recovered_values(obj: bpy.types.Object) -> dict[str, Any]:
+    """`model`, `roughness`, `f0` and `base_color` as they were recovered; None where the model has none."""
     return worn(obj) | json.loads(obj.get(FOUND, "{}"))
 
 
