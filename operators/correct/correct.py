@@ -6,10 +6,10 @@ import bpy
 from mathutils import Vector
 
 from ...addon.bridge.corrections import corrections, known_white, refitted, unseen
+from ...addon.bridge.custom_properties import OBJECT_ID
 from ...addon.bridge.job import job as jobs
 from ...addon.bridge.job.command import command
 from ...addon.bridge.light.room import cast, depsgraph_of
-from ...addon.bridge.marks import OBJECT_ID
 from ...addon.bridge.results import file
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError, ScanRelightError

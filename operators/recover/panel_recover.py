@@ -2,8 +2,8 @@
 
 import bpy
 
+from ...addon.bridge.custom_properties import OWN_SCENE
 from ...addon.bridge.job import job as jobs
-from ...addon.bridge.marks import OWN_SCENE
 from ...addon.bridge.results import changes as room_changes
 from ...addon.bridge.results import default_folders, images
 from ...addon.console import duration

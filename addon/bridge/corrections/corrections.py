@@ -1,7 +1,7 @@
 """What the artist says of recovered objects: kept with them, shown at once, written beside the result for a refit.
 
-An object's property `marks.GIVEN` holds it, so that it is saved and undone with the scene. The result folder's
-`overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
+An object's property `custom_properties.GIVEN` holds it, so that it is saved and undone with the scene. The result
+folder's `overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
 """
 
 import json
@@ -18,7 +18,7 @@ from ...core.errors import BadInputError
 from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ...core.results.result_folders import write_capture
-from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
+from ..custom_properties import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
 from . import material, unseen

@@ -1,7 +1,7 @@
 """The material of a corrected object: what is given laid over what was found, and back.
 
-Before the first change the object notes what was found (`marks.FOUND`) and the material what it showed, so that the way
-back needs neither the result folder nor this add-on's memory.
+Before the first change the object stores what was found (`custom_properties.FOUND`), and the material what it showed:
+to go back needs neither the result folder nor this add-on's memory.
 """
 
 import json
@@ -13,6 +13,7 @@ from ...core.brdf.compensation import ior_of
 from ...core.brdf.lambertian import LAMBERTIAN
 from ...core.brdf.registry import find_or_lambertian
 from ...core.results.overrides import LOBE
+from ..custom_properties import FOUND
 from ..data.materials import (
     BASE_COLOR,
     EMISSION_STRENGTH,
@@ -26,7 +27,6 @@ from ..data.materials import (
     principled,
 )
 from ..data.nodes import feed, mix_node
-from ..marks import FOUND
 from ..results import file
 
 WORN = "scan_relight_worn"

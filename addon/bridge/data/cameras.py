@@ -18,7 +18,7 @@ from ...core.scene.lens_json import lens_from_json, lens_to_json
 from ...core.scene.lenses import Cropped, Equirectangular
 from ...core.scene.model import Camera, Frame, Mesh
 from ...core.scene.pixel_rays import widest_angle
-from ..marks import CAPTURE
+from ..custom_properties import CAPTURE
 
 LENS = "lens_model"
 """Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""

@@ -10,7 +10,7 @@ from ...core.brdf.material import ObjectMaterial
 from ...core.errors import BadInputError
 from ...core.naming import MAX_LENGTH, cut
 from ...core.results.room_file import MATERIALS, layout_of
-from ..marks import IMAGE, LAYOUT, UV_MAP
+from ..custom_properties import IMAGE, LAYOUT, UV_MAP
 from .mesh_objects import PARTS_UV
 
 RADIANCE = "Linear Rec.709"
@@ -23,7 +23,7 @@ DATA = "Non-Color"
 def load_image(
     path: Path | str, name: str | None = None, colour_space: str = RADIANCE, keep: bool = True
 ) -> bpy.types.Image:
-    """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
+    """Link an image file of a result folder; it is marked (`custom_properties.IMAGE`) with where it came from.
 
     Parameters
     ----------

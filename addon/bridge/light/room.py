@@ -11,9 +11,9 @@ from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.errors import BadInputError
 from ...core.luminance import LUMINANCE
 from ...core.photo import MIDDLE_GREY
+from ..custom_properties import OBJECT_ID
 from ..data.images import image_array
 from ..data.materials import opacity
-from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ..custom_properties import OBJECT_ID
 from ..light.room import (
     CURSOR,
     OBJECT,
@@ -19,7 +20,6 @@ from ..light.room import (
     target_of,
     view_direction,
 )
-from ..marks import OBJECT_ID
 
 _OBJECT_SHARE = 0.05
 """Weighted share of the picture from which on a single object is its subject."""

@@ -9,7 +9,7 @@ import bpy
 from ...core.errors import BadInputError
 from ...core.io.folder import SCENE
 from ...core.results.result_folders import DOCUMENTS_FOLDER, FOLDER_BESIDE, captures, documents, free_folder, own_folder
-from ..marks import CAPTURE, RESULT
+from ..custom_properties import CAPTURE, RESULT
 
 PACKAGE = __package__.rsplit(".", 3)[0]
 """The root package, under whatever name Blender installed it."""

@@ -16,8 +16,8 @@ from ...core.errors import BadInputError
 from ...core.kinds import Limit, Shown
 from ...core.results.result_folders import FOLDER_BESIDE
 from ...core.results.room_file import MATERIALS, layout_of, run_of
+from ..custom_properties import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from ..data.images import relative_to, result_of
-from ..marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from . import file
 from .default_folders import display_path
 from .images import KEPT, is_there, kept_path, path_of, result_images

@@ -54,7 +54,7 @@ class Room:
 def run_of(folder: Path | str) -> str:
     """The key of the run that a result folder holds; '' where there is none, or it is older than such keys.
 
-    Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
+    Objects that were made by this run carry the same (`custom_properties.RUN`); the folder holds nothing about others.
     """
     return _text(folder, "run")
 

@@ -111,7 +111,7 @@ def test_beside_the_file_once_it_is_saved_and_where_the_room_is(preferences, mod
     module("addon.core.results.result_folders").write_capture(before, capture)
     top = bpy.data.collections.new("Scan Relight")
     scene.collection.children.link(top)
-    module("addon.bridge.marks").mark(top, before, "a" * 16, capture)
+    module("addon.bridge.custom_properties").set_run(top, before, "a" * 16, capture)
     assert preferences.result_folder("", str(capture), scene) == before
     assert preferences.result_folder("", str(tmp_path / "other" / "room"), scene) == beside
 
