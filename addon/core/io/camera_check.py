@@ -1,4 +1,4 @@
-"""Whether a camera's numbers can be those of one: a slip of the decimal point would overflow far from its cause."""
+"""Plausibility checks of camera parameters: a misplaced decimal point would cause an overflow much later."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""EXIF of JPEG and TIFF, which is a TIFF within a JPEG: how long and how wide a camera was open.
+"""EXIF of JPEG and TIFF, which is a TIFF within a JPEG: exposure time, f-number, ISO and orientation.
 
 OpenImageIO 3.0 leaves out the ISO of TIFF's EXIF, and frames of unlike ISO would come out as unlike light.
 Source: TIFF 6.0, section 2; CIPA DC-008 (Exif 2.32), 4.6.5.
@@ -87,21 +87,21 @@ def exposure_tags(data: bytes, pointer: int | None = None, order: str = "", base
 
 
 def exif_exposure(path: Path) -> dict[int, float]:
-    """Exposure time in seconds, f-number and ISO of the JPEG, TIFF, DNG or HEIC `path`, by tag, as far as it tells."""
+    """Exposure time in seconds, f-number and ISO of the JPEG, TIFF, DNG or HEIC `path`, by tag, as far as stated."""
     data = read_bytes(path, "Picture ", HEAD_BYTES)
     if is_heif(data):
         return exposure_tags(heif_exif(path))
     if not data.startswith(JPEG_MAGIC):
         try:
             return exposure_tags(*_directory(data, path))
-        except (struct.error, KeyError):  # damaged, as its size will tell
+        except (struct.error, KeyError):  # damaged: reported when its size is read
             return {}
     offset = data.find(b"Exif\0\0")
     return exposure_tags(data[offset + 6 :]) if offset >= 0 else {}
 
 
 def exif_orientation(path: Path) -> int:
-    """How the camera was held that took the TIFF or DNG `path`, EXIF's number; 1 where it does not tell."""
+    """EXIF's orientation of the TIFF or DNG `path`; 1 where it is not stated."""
     try:
         return int(read_tags(*_directory(read_bytes(path, "Picture ", HEAD_BYTES), path)).get(ORIENTATION, 1))
     except (struct.error, KeyError, ValueError, OverflowError):

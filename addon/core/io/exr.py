@@ -145,7 +145,7 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
 
 
 def _layer_to_read(path: Path) -> tuple[ExrLayer, str]:
-    """What to read of `path`, and `choose_layer`'s note; raises `BadInputError` where `read_exr` has no meaning."""
+    """The layer to read of `path`, and `choose_layer`'s note; raises `BadInputError` where `read_exr` can't read it."""
     layer, note = choose_layer(parse_headers(path), path)
     header = layer.header
     x, y = header.data_window[:2]
@@ -163,7 +163,7 @@ def _layer_to_read(path: Path) -> tuple[ExrLayer, str]:
 
 
 def _place(plane: np.ndarray, header: ExrHeader, fill: float) -> np.ndarray:
-    """Move `plane` from the data window into the display window; `fill` where it says nothing."""
+    """Move `plane` from the data window into the display window; `fill` outside of the data."""
     width, height = header.size
     placed = np.full((height, width, *plane.shape[2:]), fill, np.float32)
     x = header.data_window[0] - header.display_window[0]

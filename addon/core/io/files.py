@@ -1,4 +1,4 @@
-"""Files of a capture: read with care, and within its folder, unless the user allows more."""
+"""Reading files of a capture safely, and only within its folder unless the user allows more."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -14,7 +14,7 @@ MAX_TEXT: Limit[int] = 1 << 28
 
 
 class EscapesError(BadInputError):
-    """A path leads out of the capture's folder: no slip of one frame, so it is told at once."""
+    """A path leads out of the capture's folder: not one frame's mistake, so it is reported at once."""
 
 
 def absence(path: Path) -> str:
@@ -30,7 +30,7 @@ def check_picture(path: Path) -> None:
 
 @contextmanager
 def readable(what: str, remedy: str = "check the file and its rights") -> Iterator[None]:
-    """Turn what the system refuses as `what` is read into one sentence, a `BadInputError`."""
+    """Turn an `OSError` while `what` is read into a `BadInputError`, one sentence long."""
     try:
         yield
     except OSError as error:

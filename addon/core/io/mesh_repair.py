@@ -1,4 +1,4 @@
-"""Take out of a mesh what no later stage can use: triangles without area, vertices that are not finite."""
+"""Mesh repair: removes triangles without area and vertices that are not finite."""
 
 from dataclasses import replace
 

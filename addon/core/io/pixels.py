@@ -1,4 +1,4 @@
-"""What a frame measured: its pictures read, exposure divided out, brackets merged, pixels that say nothing marked."""
+"""Radiance of a frame: pictures read, exposure divided out, brackets merged, invalid pixels marked."""
 
 from dataclasses import replace
 

@@ -19,9 +19,9 @@ from .picture import Picture, check_claim, decoding
 
 DNG = "DNG"
 DNG_VERSION: Code[int] = 50706
-"""The tag that tells a DNG from another TIFF."""
+"""The tag that distinguishes a DNG from other TIFFs."""
 HEAD_BYTES: Limit[int] = 1 << 16
-"""Bytes in which the first directory has to end; a DNG begins with it, as its specification recommends."""
+"""Bytes within which the first directory has to end; the specification recommends to put it first."""
 MAX_VALUE: Code[int] = 65535
 """LibRaw's greatest value, at which the sensor clips."""
 
