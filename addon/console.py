@@ -78,18 +78,18 @@ class ConsoleProgress:
             self._width = 0
 
 
-class StopWish:
+class StopSignal:
     """While entered, the first Ctrl-C or SIGTERM is only noted; a second one takes effect at once."""
 
     def __init__(self):
-        self.wished = False
+        self.requested = False
         self._before = {}
 
     def __call__(self) -> bool:
         """Whether a stop was requested."""
-        return self.wished
+        return self.requested
 
-    def __enter__(self) -> StopWish:
+    def __enter__(self) -> StopSignal:
         for number in (signal.SIGINT, signal.SIGTERM):
             with contextlib.suppress(ValueError):  # not the main thread: then nobody sends it signals
                 self._before[number] = signal.signal(number, self._note)
@@ -101,9 +101,9 @@ class StopWish:
         self._before.clear()
 
     def _note(self, number, frame):
-        if self.wished:
+        if self.requested:
             raise KeyboardInterrupt
-        self.wished = True
+        self.requested = True
 
 
 @contextlib.contextmanager

@@ -64,13 +64,13 @@ class Leash:
     """
 
     def __init__(self, descriptor: int = 0, end: Callable[[int], None] = os._exit, grace: float = GRACE):
-        self.wished = False
+        self.requested = False
         self._descriptor, self._end, self._grace = descriptor, end, grace
         threading.Thread(target=self._watch, name="leash", daemon=True).start()
 
     def __call__(self) -> bool:
         """Whether a stop was requested."""
-        return self.wished
+        return self.requested
 
     def _watch(self) -> None:
         received = b""
@@ -82,7 +82,7 @@ class Leash:
             if not chunk:
                 break
             received = received[-len(STOP) :] + chunk
-        self.wished = True
+        self.requested = True
         time.sleep(self._grace)
         self._end(EXIT_INTERRUPTED)
 

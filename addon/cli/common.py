@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TextIO
 
-from ..console import ConsoleProgress, StopWish
+from ..console import ConsoleProgress, StopSignal
 from ..core.errors import EXIT_FAILURE, BadInputError
 from ..core.settings import PRESETS, Settings
 from ..leash import JsonProgress, Leash, MemoryGuard
@@ -97,9 +97,9 @@ def console_run(arguments: argparse.Namespace, stream: TextIO):
     listener = JsonProgress(stream) if machine else ConsoleProgress(stream, quiet=arguments.quiet)
     guard = MemoryGuard(getattr(arguments, "memory_limit", 0.0), lambda text: os._exit(complain(text, EXIT_FAILURE)))
     leash = Leash() if getattr(arguments, "stop_with_stdin", False) else None
-    with StopWish() as wish:
+    with StopSignal() as stop:
         try:
-            yield {"listener": listener, "should_stop": lambda: guard() or wish() or (leash is not None and leash())}
+            yield {"listener": listener, "should_stop": lambda: guard() or stop() or (leash is not None and leash())}
         finally:
             guard.close()
             listener.close()
