@@ -14,7 +14,7 @@ from .core.errors import BadInputError, InterruptedRun, ScanRelightError
 from .core.io.layout import AS_FOUND, Layout, RawMesh, Reader, Reading
 from .core.io.read import read_capture
 from .core.io.readers import register_reader
-from .core.pipeline.run import WHOLE, Asked, Run, SceneWriter, progress_of_run
+from .core.pipeline.run import WHOLE, Request, Run, SceneWriter, progress_of_run
 from .core.progress import Progress, ProgressEvent
 from .core.scene.model import Camera, Capture, Frame, Mesh
 from .core.scene.unwrap import Unwrap, by_xatlas, own_coordinates
@@ -190,7 +190,7 @@ def recover(
     progress : callable(ProgressEvent), optional
         Called from this thread as the work goes on.
     should_stop : callable() -> bool, optional
-        Asked at each of those; True ends the run by `InterruptedRun`, with the finished stages kept.
+        Called at each of those; True ends the run by `InterruptedRun`, with the finished stages kept.
     unwrap : callable or str
         What lays out the atlas; see `unwrapper`.
     reading : Reading
@@ -205,22 +205,22 @@ def recover(
     ScanRelightError
         One sentence on what is wrong; `BadInputError` where it is with what was given.
     """
-    asked = Asked(reading=reading, override=overrides, white=white)
+    request = Request(reading=reading, override=overrides, white=white)
     run_progress = progress_of_run(progress, should_stop)
-    run, lay_out = _read(capture, Path(folder), settings or Settings(), run_progress, asked, unwrap)
+    run, lay_out = _read(capture, Path(folder), settings or Settings(), run_progress, request, unwrap)
     with run:
         run.stages(lay_out)
     return Recovered(run)
 
 
 def run_without_scene(
-    capture: Path, folder: Path, settings: Settings, progress: Progress, asked: Asked = WHOLE, unwrap: str = ""
+    capture: Path, folder: Path, settings: Settings, progress: Progress, request: Request = WHOLE, unwrap: str = ""
 ) -> dict[str, Any]:
-    """Recover a capture as far as is asked, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
-    run, lay_out = _read(capture, folder, settings, progress, asked, unwrap)
+    """Recover as far as is requested, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
+    run, lay_out = _read(capture, folder, settings, progress, request, unwrap)
     with run:
         report = run.stages(lay_out)
-        return run.write() if asked.until == WRITE else report
+        return run.write() if request.until == WRITE else report
 
 
 def _read(
@@ -228,14 +228,14 @@ def _read(
     folder: Path,
     settings: Settings,
     progress: Progress,
-    asked: Asked,
+    request: Request,
     unwrap: Unwrap | str,
 ) -> tuple[Run, Unwrap]:
     """The run over a capture, which is read now unless it was, and what lays out its atlas."""
-    asked.check(capture.root if isinstance(capture, Capture) else Path(capture), folder)
+    request.check(capture.root if isinstance(capture, Capture) else Path(capture), folder)
     started = time.monotonic()
     lay_out = unwrapper(unwrap) if isinstance(unwrap, str) else unwrap
     progress.stage(READ)
     if not isinstance(capture, Capture):
-        capture = read_capture(capture, asked.reading)
-    return Run(capture, folder, settings, progress, asked, {"scan_relight": VERSION}, started), lay_out
+        capture = read_capture(capture, request.reading)
+    return Run(capture, folder, settings, progress, request, {"scan_relight": VERSION}, started), lay_out

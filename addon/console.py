@@ -1,4 +1,4 @@
-"""The console's side of a run: one line that is rewritten, or plain lines in a log; and the wish to stop."""
+"""A run on the console: progress as one rewritten line or as lines of a log, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TTY_SECONDS: Shown[float] = 0.1
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: '8 s', '2 min 05 s', '1 h 10 min'."""
+    """Seconds as readable text: '8 s', '2 min 05 s', '1 h 10 min'."""
     seconds = int(round(seconds))
     if seconds < 60:
         return f"{seconds} s"
@@ -78,18 +78,18 @@ class ConsoleProgress:
             self._width = 0
 
 
-class StopWish:
-    """While entered, Ctrl-C and a polite kill are noted instead of obeyed; a second one is obeyed at once."""
+class StopSignal:
+    """While entered, the first Ctrl-C or SIGTERM is only noted; a second one takes effect at once."""
 
     def __init__(self):
-        self.wished = False
+        self.requested = False
         self._before = {}
 
     def __call__(self) -> bool:
-        """Whether a stop was asked for."""
-        return self.wished
+        """Whether a stop was requested."""
+        return self.requested
 
-    def __enter__(self) -> StopWish:
+    def __enter__(self) -> StopSignal:
         for number in (signal.SIGINT, signal.SIGTERM):
             with contextlib.suppress(ValueError):  # not the main thread: then nobody sends it signals
                 self._before[number] = signal.signal(number, self._note)
@@ -101,14 +101,14 @@ class StopWish:
         self._before.clear()
 
     def _note(self, number, frame):
-        if self.wished:
+        if self.requested:
             raise KeyboardInterrupt
-        self.wished = True
+        self.requested = True
 
 
 @contextlib.contextmanager
 def own_console(keep_others: bool = False) -> Iterator[TextIO]:
-    """Hand out the real standard output, and keep off the console what libraries write below Python.
+    """Yield the real standard output, and discard what libraries write to it below Python.
 
     That is Blender's chatter and OpenEXR's remarks on damaged pictures, which the program tells in its own words.
 
@@ -130,7 +130,7 @@ def own_console(keep_others: bool = False) -> Iterator[TextIO]:
 
 @contextlib.contextmanager
 def _alone(name: str, number: int) -> Iterator[TextIO]:
-    """Hand out the standard stream `name`, while all others who write to its descriptor `number` write to nowhere."""
+    """Yield the standard stream `name`, while other writes to its descriptor `number` are discarded."""
     standard = getattr(sys, name)
     try:
         direct = standard.fileno() == number
@@ -164,7 +164,7 @@ def _flush_c() -> None:
 
 
 def unexpected(error: Exception, folder: Path | str | None) -> str:
-    """One sentence for an error that nobody foresaw; its traceback goes into the file error.log in `folder`."""
+    """One sentence for an unexpected error; its traceback goes into the file error.log in `folder`."""
     sentence = f"Unexpected error ({type(error).__name__}: {' '.join(str(error).split())})"
     if folder:
         log = Path(folder) / "error.log"

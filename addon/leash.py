@@ -1,4 +1,4 @@
-"""What ties a run to whoever started it: events as lines of JSON, the wish to stop, and a limit on memory."""
+"""What ties a run to the program that started it: JSON events, stop requests and a memory limit."""
 
 import json
 import os
@@ -48,7 +48,7 @@ class JsonProgress:
 
 
 class Leash:
-    """The wish to stop of a run whose standard input is held by another program.
+    """Stop requests for a run whose standard input another program holds.
 
     The run stops where the line "stop" arrives or the input ends: so it never outlives a program that crashed.
     Where no safe point comes within `grace` seconds the process ends there; files are written whole or not at all.
@@ -64,13 +64,13 @@ class Leash:
     """
 
     def __init__(self, descriptor: int = 0, end: Callable[[int], None] = os._exit, grace: float = GRACE):
-        self.wished = False
+        self.requested = False
         self._descriptor, self._end, self._grace = descriptor, end, grace
         threading.Thread(target=self._watch, name="leash", daemon=True).start()
 
     def __call__(self) -> bool:
-        """Whether a stop was asked for."""
-        return self.wished
+        """Whether a stop was requested."""
+        return self.requested
 
     def _watch(self) -> None:
         received = b""
@@ -82,7 +82,7 @@ class Leash:
             if not chunk:
                 break
             received = received[-len(STOP) :] + chunk
-        self.wished = True
+        self.requested = True
         time.sleep(self._grace)
         self._end(EXIT_INTERRUPTED)
 
@@ -122,7 +122,7 @@ class MemoryGuard:
         )
 
     def __call__(self) -> bool:
-        """Asked where a run may be stopped; raises `MemoryLimitError` once the limit is passed."""
+        """Called where a run may be stopped; raises `MemoryLimitError` once the limit is passed."""
         if self.exceeded:
             raise MemoryLimitError(self.sentence)
         return False

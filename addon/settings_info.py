@@ -1,4 +1,4 @@
-"""What there is to say about each setting, read off the `Settings` dataclass: the one source for every interface."""
+"""Type, default and help of each setting, from the `Settings` dataclass: the single source for all interfaces."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""A folder of a run's own for temporary files, Blender's among them; the next start takes what killed runs left.
+"""A temporary folder for each run, also for Blender's files; the next start removes what killed runs left.
 
 A killed process takes nothing away, and Blender makes a folder for each session. So a run gets a folder that is locked
 as long as it lives, in which whoever asks for temporary files puts them. Only folders of this name, of this user, whose
@@ -17,7 +17,7 @@ from typing import IO
 
 NAME = "scan_relight_run_"
 LOCK = "lock"
-ASKED = ("TMPDIR", "TEMP", "TMP")
+VARIABLES = ("TMPDIR", "TEMP", "TMP")
 """Where programs look for the folder of temporary files."""
 
 
@@ -35,8 +35,8 @@ class RunFolder:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What a process is to find, so that its temporary files lie there."""
-        return {} if self.path is None else dict.fromkeys(ASKED, str(self.path))
+        """Environment variables that put a process's temporary files there."""
+        return {} if self.path is None else dict.fromkeys(VARIABLES, str(self.path))
 
     def close(self) -> None:
         if self._lock is not None:
@@ -57,7 +57,7 @@ def use_own_folder() -> None:
 
 
 def take_remains(base: Path) -> None:
-    """Take away the folders of runs that were killed."""
+    """Remove the folders of runs that were killed."""
     for folder in base.glob(f"{NAME}*"):
         with contextlib.suppress(OSError):
             status = folder.lstat()

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge.results import home
+from ..addon.bridge.results import default_folders
 from ..addon.core.kinds import Shown
 from . import keymaps
 from .base.job_operator import areas
 from .base.operator import folder_property
 from .base.panel import fields
 
-PACKAGE = home.PACKAGE
+PACKAGE = default_folders.PACKAGE
 
 
 class ScanRelightPreferences(bpy.types.AddonPreferences):
@@ -57,14 +57,14 @@ def preferences() -> ScanRelightPreferences | None:
 def results_folder() -> Path:
     """The folder of results without a chosen one whose .blend was never saved; not created here."""
     addon_preferences = preferences()
-    return home.results_folder(addon_preferences.results_folder if addon_preferences is not None else "")
+    return default_folders.results_folder(addon_preferences.results_folder if addon_preferences is not None else "")
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:
     """The result folder of a capture: `chosen`, or where that is empty the default."""
     if chosen:
         return Path(bpy.path.abspath(chosen))
-    return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
+    return default_folders.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
 
 
 def chosen_result(scene: bpy.types.Scene) -> Path | None:

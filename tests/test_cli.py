@@ -14,7 +14,7 @@ import pytest
 
 from addon import cli
 from addon.cli.common import settings_from
-from addon.console import ConsoleProgress, StopWish, duration
+from addon.console import ConsoleProgress, StopSignal, duration
 from addon.core.errors import BadInputError, InterruptedRun, StorageError
 from addon.core.progress import Progress, ProgressEvent
 from addon.core.settings import PAPER, Settings
@@ -241,10 +241,10 @@ def test_interrupting_asks_once_and_then_insists():
     import signal
 
     before = signal.getsignal(signal.SIGINT)
-    with StopWish() as wish:
-        assert not wish()
+    with StopSignal() as stop:
+        assert not stop()
         signal.raise_signal(signal.SIGINT)
-        assert wish()
+        assert stop()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is before

@@ -1,4 +1,4 @@
-"""Every pass taken out, one at a time, over rooms with truth and several seeds: what each gains, and what it costs.
+"""Each pass left out in turn, over rooms with ground truth and several seeds: what it improves, and what it costs.
 
 For each room and seed the whole method, then the method without each pass. Stages before the first that a pass changes
 are taken from the whole run's store; where that stage comes out the same without the pass, the rest does, too. One line
@@ -43,7 +43,7 @@ SURFACE = "surface"
 
 @dataclass(frozen=True)
 class Ablation:
-    """What is to be run.
+    """The runs of an ablation study.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Ablation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is taken out: the passes in the registry's order, then those that go together."""
+        """The passes to leave out, in the registry's order, then the groups left out together."""
         check([name for entry in self.passes for name in parts(entry)])
         together = tuple(name for name in self.passes if TOGETHER in name)
         return tuple(item.name for item in PASSES if not self.passes or item.name in self.passes) + together
@@ -81,17 +81,17 @@ class Ablation:
         return bool(self.limit) and time.monotonic() - self.started > self.limit
 
     def settings(self, seed: int, name: str = WHOLE) -> Settings:
-        """Of one run."""
+        """The settings of one run."""
         return replace(PRESETS[self.preset], seed=seed, threads=self.threads, without=parts(name))
 
 
 def parts(name: str) -> tuple[str, ...]:
-    """The passes of one line: none for the whole method, several where they were taken out together."""
+    """The passes left out in one line: none for the whole method, several where they were left out together."""
     return tuple(name.split(TOGETHER)) if name != WHOLE else ()
 
 
 def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
-    """The runs in some files of lines; one that is there twice counts once, as it came last."""
+    """The runs in files of JSON lines; of a run that occurs twice, the last one counts."""
     runs = {}
     for path in paths:
         try:
@@ -110,7 +110,7 @@ def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def run_ablation(ablation: Ablation, tell: Callable[[str], None] = lambda text: None) -> Path:
-    """Do what is not done yet; the file of lines.
+    """Do the runs that are not done yet; returns the file of lines.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _describe(line: dict[str, Any]) -> str:
 
 
 class Bench:
-    """One room under one seed: the whole run is done or taken from the store, the others start from its stages."""
+    """One room with one seed: the whole run is done or taken from the store, the others start from its stages."""
 
     def __init__(self, ablation: Ablation, room: Path, seed: int):
         self._ablation, self._seed, self.room = ablation, seed, room
@@ -214,7 +214,7 @@ class Bench:
         }  # fmt: skip
 
     def _same(self, stage: str, store: Store) -> bool:
-        """Whether a stage holds what the whole run's does."""
+        """Whether a stage's result equals that of the whole run."""
         with Store(self._folder) as whole:
             (arrays, meta), (whole_arrays, whole_meta) = (_stored(source, stage) for source in (store, whole))
         return (

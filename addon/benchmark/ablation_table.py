@@ -18,7 +18,7 @@ Line = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: its name in the lines, in verdicts, its column, and what makes it comparable.
+    """One figure: its name in the lines and in verdicts, its column, and what makes it comparable.
 
     Attributes
     ----------

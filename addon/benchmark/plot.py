@@ -78,6 +78,6 @@ def write_points(points: Sequence[tuple[str, float, float, float]], x: str, y: s
 
 
 def _is_drawn(record: dict, table: Table) -> bool:
-    """Whether a row has a place in the plot: a positive cost, and an error that was measured."""
+    """Whether a row can be plotted: a positive cost, and an error that was measured."""
     cost, error = record[table.cost], record[table.error]
     return cost is not None and error is not None and cost > 0 and math.isfinite(cost) and math.isfinite(error)

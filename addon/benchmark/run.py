@@ -1,4 +1,4 @@
-"""The benchmark's stages, what they are told, and the files they leave."""
+"""The benchmark's stages, their options, and the files they write."""
 
 import importlib.metadata
 import importlib.util
@@ -30,7 +30,7 @@ class SkippedStage(Exception):
 
 @dataclass(frozen=True)
 class Options:
-    """What a stage is told.
+    """Options of a stage.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Options:
     out : Path
         Where the files go.
     progress : Progress
-        To be told the share of the stage that is done; raises `InterruptedRun` when the user wants to stop.
+        Receives the share of the stage that is done; raises `InterruptedRun` when the user wants to stop.
     """
 
     capture: Path | None = None
@@ -57,7 +57,7 @@ class Options:
 
 
 def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
-    """The stages asked for in their order, all where none is named; raises `BadInputError` for an unknown one."""
+    """The requested stages in their order, all where none is named; raises `BadInputError` for an unknown one."""
     for name in stages:
         if name not in STAGES:
             raise BadInputError(f"There is no benchmark '{name}'; choose among {', '.join(STAGES)}.")
@@ -66,7 +66,7 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
 
 @contextmanager
 def room_and_scratch(options: Options) -> Iterator[tuple[Path, Path]]:
-    """The capture that is measured on, the demo's room where none is given; and a folder that goes at the end."""
+    """The capture to measure, by default the demo's room, and a temporary folder."""
     with tempfile.TemporaryDirectory(dir=options.out, prefix="tmp-") as scratch:
         folder = options.capture
         if folder is None:
@@ -166,7 +166,7 @@ def _index(results: dict[str, Table | str], seconds: dict[str, float], options: 
 
 
 def describe_machine() -> dict[str, str]:
-    """Processor, cores, memory, system and versions, neither host nor path; what can't be found out is left out."""
+    """Processor, cores, memory, system and versions, without host or path; what can't be determined is left out."""
     bpy = sys.modules.get("bpy")
     facts = {
         "processor": _processor(),

@@ -1,7 +1,7 @@
-"""A stage, or all of them, under each of some alternatives: how wrong what comes out is, and what it costs.
+"""One stage, or all, under several alternatives: the error of the result, and its cost.
 
-Alternatives are settings, so what is measured is what a user gets; the paper's are among them. Wrong is what differs
-from the same stage under the settings of `FINEST`; of the specular stage and of all together, from the capture's truth.
+Alternatives are settings, so what is measured is what a user gets; the paper's are among them. The error is taken
+against the same stage with the settings of `FINEST`; of the specular stage and of all, against the capture's truth.
 """
 
 import gc
@@ -85,7 +85,7 @@ def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator
     measured = STAGES if stage == WHOLE else (stage,)
 
     def under(changes: Changes) -> tuple[Recovery, float, float]:
-        """Seconds by the clock on the wall, and of all threads of this process, which others disturb less."""
+        """Wall-clock seconds, and processor seconds of all threads of this process, which others disturb less."""
         with Store(scratch / "stages") as store:
             store.drop(measured)
             settings = replace(base, **changes | {"threads": options.threads, "seed": options.seed})
@@ -108,7 +108,7 @@ def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator
 
 
 def _against(stage: str, finest: Recovery) -> Callable[[Recovery], tuple]:
-    """How far L_d or E is from that of the finest settings, where frames saw the surface."""
+    """Error of L_d or E against the finest settings, where frames saw the surface."""
     seen = finest.lit_diffuse().seen
 
     def of_lit_diffuse(recovery: Recovery) -> tuple:

@@ -1,4 +1,4 @@
-"""A benchmark's table: what was run, how wrong it was, what it cost. As CSV in full precision, as Markdown rounded."""
+"""A benchmark's table: runs, their errors and costs. CSV in full precision, Markdown rounded."""
 
 import csv
 import io
@@ -65,7 +65,7 @@ class Table:
     def markdown(self) -> str:
         """Title, table and notes; floats to `DIGITS` significant digits."""
         lines = [f"## {self.title}", "", _line(self.columns), _line(["---"] * len(self.columns))]
-        lines += [_line([shown(cell) for cell in record.values()]) for record in self.records()]
+        lines += [_line([formatted(cell) for cell in record.values()]) for record in self.records()]
         lines += [""] + [f"- {note}" for note in self.notes]
         return "\n".join(lines).rstrip() + "\n"
 
@@ -79,8 +79,8 @@ def _line(cells) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def shown(cell: Cell) -> str:
-    """A cell for people: '0.0123', '1.2e-05', '12345', 'yes'."""
+def formatted(cell: Cell) -> str:
+    """A cell as readable text: '0.0123', '1.2e-05', '12345', 'yes'."""
     if cell is None or cell is False:
         return ""
     if cell is True:

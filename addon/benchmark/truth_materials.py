@@ -10,15 +10,15 @@ import numpy as np
 from ..core.brdf.material import ObjectMaterial
 from ..core.kinds import Workload
 
-LEAST_PIXELS: Workload[int] = 100
+MIN_PIXELS: Workload[int] = 100
 """In the held-out views, that an object is judged by."""
-UNTOLD: Workload[float] = 0.5
+DEFAULT_ROUGHNESS: Workload[float] = 0.5
 """Blender's Roughness where the result says none."""
 
 
 @dataclass(frozen=True)
 class MaterialScores:
-    """How right the materials are.
+    """How well the materials match the truth.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ def found_roughness(material: ObjectMaterial) -> float | None:
 def written_roughness(material: ObjectMaterial) -> float:
     """sqrt(alpha), Blender's own where none was found."""
     roughness = found_roughness(material)
-    return UNTOLD if roughness is None else roughness
+    return DEFAULT_ROUGHNESS if roughness is None else roughness
 
 
 def true_roughness(entry: Mapping[str, Any]) -> float | None:
@@ -87,7 +87,7 @@ def score_materials(
     errors, weights, models = [], [], Counter[str]()
     for true_id, by_part in sorted(pixels_of.items()):
         entry, seen = truth[true_id], sum(by_part.values())
-        if seen < LEAST_PIXELS or entry["masked"] or entry["bsdf"] == "dielectric":
+        if seen < MIN_PIXELS or entry["masked"] or entry["bsdf"] == "dielectric":
             continue
         true = true_roughness(entry)
         if true is not None:

@@ -68,6 +68,6 @@ def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) ->
 
 def pairs(seen: list[dict]) -> dict[tuple[int, int], int]:
     """How many pixels of each true object show which object of the result: the same one, unless parts were found."""
-    ids, found, inside = (np.concatenate([view[key] for view in seen]) for key in ("id", "found", "inside"))
-    both, count = np.unique(np.stack([ids, found], 1)[inside], axis=0, return_counts=True)
-    return {(true, mine): n for (true, mine), n in zip(both.tolist(), count.tolist(), strict=True)}
+    true_ids, result_ids, inside = (np.concatenate([view[key] for view in seen]) for key in ("id", "found", "inside"))
+    pairs_of_ids, count = np.unique(np.stack([true_ids, result_ids], 1)[inside], axis=0, return_counts=True)
+    return {(true, recovered): n for (true, recovered), n in zip(pairs_of_ids.tolist(), count.tolist(), strict=True)}

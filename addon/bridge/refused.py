@@ -9,7 +9,7 @@ from pathlib import Path
 from ..core.errors import BadInputError, StorageError
 from ..core.kinds import Shown
 
-MAX_TOLD: Shown[int] = 3
+MAX_LISTED: Shown[int] = 3
 
 
 def reason_of(error: Exception) -> str:
@@ -48,9 +48,9 @@ def sentences(*remarks: tuple[list[str], str]) -> tuple[str, ...]:
 
 def _list_names(names: list[str]) -> str:
     """Names of objects for a sentence: the first ones, and how many more."""
-    listed = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
+    listed = ", ".join(f"'{name}'" for name in names[:MAX_LISTED])
     return (
-        f"Objects {listed} and {len(names) - MAX_TOLD} more"
-        if len(names) > MAX_TOLD
+        f"Objects {listed} and {len(names) - MAX_LISTED} more"
+        if len(names) > MAX_LISTED
         else f"Object{'s' if len(names) > 1 else ''} {listed}"
     )

@@ -1,4 +1,4 @@
-"""The command line: arguments to settings, errors to exit codes. One program for both homes.
+"""The command line: arguments to settings, errors to exit codes. The same program in both environments.
 
 As `scan-relight` in a Python environment with Blender's bpy, and as `blender --command scan_relight` once the
 extension is installed. Nothing of Blender or the method is imported before it is needed, so that `--help` is quick.
@@ -83,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that tells the exit codes, and what is wrong in one sentence instead of a page of usage."""
+    """A parser that documents the exit codes, and reports a mistake in one sentence instead of a page of usage."""
 
     def __init__(self, *args, **options):
         super().__init__(*args, epilog=EXIT_CODES, **options)
@@ -122,7 +122,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the command back."""
+    """Unregister the command."""
     global _handle
     import bpy
 

@@ -1,4 +1,4 @@
-"""`scan-relight benchmark ablation`: what each pass gains, from the command line."""
+"""`scan-relight benchmark ablation`: how much each pass improves the result."""
 
 import argparse
 import sys
@@ -17,7 +17,7 @@ COMMAND = "-".join(NAMES)
 
 
 def joined(argv: Sequence[str] | None) -> list[str]:
-    """Arguments in which the command's two words are one."""
+    """The arguments with the command's two words joined into one."""
     argv = list(sys.argv[1:] if argv is None else argv)
     return [COMMAND, *argv[2:]] if tuple(argv[:2]) == NAMES else argv
 

@@ -1,4 +1,4 @@
-"""What the commands have in common: options that several take, and how their runs are followed."""
+"""What the commands share: common options, progress reports and messages."""
 
 import argparse
 import contextlib
@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TextIO
 
-from ..console import ConsoleProgress, StopWish
+from ..console import ConsoleProgress, StopSignal
 from ..core.errors import EXIT_FAILURE, BadInputError
 from ..core.settings import PRESETS, Settings
 from ..leash import JsonProgress, Leash, MemoryGuard
@@ -18,7 +18,7 @@ from ..settings_info import setting_infos
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
+    """Add the options on how to read a capture whose folder does not say: one for each field of `Reading`."""
     add = parser.add_argument_group("the capture").add_argument
     add(
         "--format",
@@ -35,7 +35,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def reading_from(arguments: argparse.Namespace):
-    """The `Reading` that was asked for."""
+    """The `Reading` that the options request."""
     from ..core.io.layout import Reading
 
     def import_mesh(path: Path):
@@ -46,7 +46,7 @@ def reading_from(arguments: argparse.Namespace):
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """One option for each field of `Settings`."""
+    """Add one option for each field of `Settings`."""
     group = parser.add_argument_group("settings")
     text = "what the settings below start from; 'paper' is the published method (default normal)"
     group.add_argument("--preset", choices=tuple(PRESETS), default="normal", help=text)
@@ -64,7 +64,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_from(arguments: argparse.Namespace) -> Settings:
-    """The preset with everything that was given."""
+    """The chosen preset, changed by the options that were given."""
     given = {info.name: getattr(arguments, info.name) for info in setting_infos()}
     given["without"] = None if arguments.without is None else tuple(arguments.without)
     return replace(PRESETS[arguments.preset], **{name: value for name, value in given.items() if value is not None})
@@ -81,7 +81,7 @@ def _add_leash(parser: argparse.ArgumentParser) -> None:
 
 
 def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True, leash: bool = False) -> None:
-    """Options of every command, and what runs it; `quiet`: one of them is to print nothing; `leash`: see `Leash`."""
+    """Add the options of every command, and the `function` that runs it; `quiet` adds --quiet; `leash`: see `Leash`."""
     if leash:
         _add_leash(parser)
     if quiet:
@@ -92,14 +92,14 @@ def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True, le
 
 @contextlib.contextmanager
 def console_run(arguments: argparse.Namespace, stream: TextIO):
-    """The listener and the wish to stop of a long command, as keywords of `run.progress_of_run`."""
+    """The listener and the stop check of a long command, as keyword arguments of `run.progress_of_run`."""
     machine = getattr(arguments, "progress", "text") == "json"
     listener = JsonProgress(stream) if machine else ConsoleProgress(stream, quiet=arguments.quiet)
     guard = MemoryGuard(getattr(arguments, "memory_limit", 0.0), lambda text: os._exit(complain(text, EXIT_FAILURE)))
     leash = Leash() if getattr(arguments, "stop_with_stdin", False) else None
-    with StopWish() as wish:
+    with StopSignal() as stop:
         try:
-            yield {"listener": listener, "should_stop": lambda: guard() or wish() or (leash is not None and leash())}
+            yield {"listener": listener, "should_stop": lambda: guard() or stop() or (leash is not None and leash())}
         finally:
             guard.close()
             listener.close()
@@ -108,7 +108,7 @@ def console_run(arguments: argparse.Namespace, stream: TextIO):
 def tell_end(
     arguments: argparse.Namespace, stream: TextIO, listener, remarks: Iterable[str], line: str, kind="Warning", **done
 ) -> None:
-    """How a run ended, with its remarks: to a program that follows it as events, the last with `done`; else as text."""
+    """Report the end of a run and its remarks: as JSON events, the last with the values `done`, or as text."""
     if isinstance(listener, JsonProgress):
         for remark in remarks:
             listener.tell("warning", text=remark)
@@ -118,14 +118,14 @@ def tell_end(
 
 
 def need(module: str):
-    """A module of the bridge; where there is no Blender, say so in one sentence."""
+    """Import a module of the bridge; raises `BadInputError`, one sentence, where Blender is missing."""
     with needed_packages():
         return importlib.import_module(f"..bridge.{module}", __package__)
 
 
 @contextlib.contextmanager
 def needed_packages():
-    """Turn the absence of a package that the method needs into one sentence."""
+    """Turn the import error of a required package into a `BadInputError`, one sentence long."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -139,7 +139,7 @@ def needed_packages():
 
 
 def complain(sentence: str, code: int) -> int:
-    """Say what went wrong on standard error; returns `code`."""
+    """Print an error to standard error; returns `code`."""
     with contextlib.suppress(OSError, ValueError):
         print(f"scan-relight: {sentence}", file=sys.stderr, flush=True)
     return code

@@ -51,16 +51,19 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
     lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
     print(f"{facts['capture']} ({facts['format']})", file=stream)
-    told = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
-    print(f"  frames     {facts['frames']}{told}", file=stream)
+    details = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
+    print(f"  frames     {facts['frames']}{details}", file=stream)
     print(
         f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
         f"{extent} m",
         file=stream,
     )
     print(f"  instances  {len(facts['instances'])}", file=stream)
-    for one in facts["instances"]:
-        print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
+    for instance in facts["instances"]:
+        print(
+            f"    {instance['object_id']:>5}  {instance['class_name']:<24} {instance['triangles']:>8} triangles",
+            file=stream,
+        )
     for warning in facts["warnings"]:
         print(f"  warning    {warning}", file=stream)
     for sentence in facts.get("agreement", {}).get("sentences", ()):
@@ -69,7 +72,7 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 
 def compare(capture, arguments: argparse.Namespace) -> dict:
-    """Whether frames and mesh fit, ready for JSON; writes the overlay where one is wanted."""
+    """Whether frames and mesh fit, ready for JSON; writes the overlay if its path was given."""
     with needed_packages():
         from ..core.agreement.look import look
         from ..core.agreement.overlay import overlay
@@ -78,15 +81,15 @@ def compare(capture, arguments: argparse.Namespace) -> dict:
         from ..core.io.pixels import read_pixels
         from ..core.io.png import png
 
-        found = look(capture, read_pixels, search=not arguments.convention)
+        fit = look(capture, read_pixels, search=not arguments.convention)
         if arguments.overlay is not None:
-            columns = [Convention()] + ([found.best.convention] if found.best else [])
+            columns = [Convention()] + ([fit.best.convention] if fit.best else [])
             write_bytes(arguments.overlay, png(overlay(capture, read_pixels, columns)))
     return {
-        "fits": found.fits,
-        "quality": found.as_read.quality,
-        "hit": found.as_read.hit,
-        "convention": str(found.best.convention) if found.best else None,
-        "misaligned_pixels": found.misaligned.round(3).tolist(),
-        "sentences": found.sentences(),
+        "fits": fit.fits,
+        "quality": fit.as_read.quality,
+        "hit": fit.as_read.hit,
+        "convention": str(fit.best.convention) if fit.best else None,
+        "misaligned_pixels": fit.misaligned.round(3).tolist(),
+        "sentences": fit.sentences(),
     }

@@ -1,4 +1,4 @@
-"""The command `recover`: its options, how a capture is read, with a scene or without."""
+"""The command `recover`: its options, and the run with Blender or without."""
 
 import argparse
 import re
@@ -44,13 +44,13 @@ def add_recover(commands) -> None:
     add("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE, help=last)
     anew = "do this stage and all later ones anew, though they are stored"
     add("--from-stage", metavar="STAGE", choices=RUN_STAGES, help=anew)
-    add_home(parser)
+    add_result_options(parser)
     add_settings(parser)
     add_common(parser, recover_command, leash=True)
 
 
-def add_home(parser: argparse.ArgumentParser) -> None:
-    """How the result is made: with Blender or without, and with what is known of objects."""
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options on how the result is made: with Blender or without, and with what is known of objects."""
     scene = "also write scene.blend, which takes Blender's bpy (default yes)"
     parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
     layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
@@ -64,32 +64,32 @@ def add_home(parser: argparse.ArgumentParser) -> None:
 
 
 def _grey(text: str) -> str:
-    """The text of `--grey`, which `--white` would take as well, if it names a pixel."""
+    """Check that the text of `--grey` names a pixel, and return it: `--white` takes it as well."""
     if not re.fullmatch(r".+:\s*\d+\s*,\s*\d+\s*(=.*)?", text):
         raise argparse.ArgumentTypeError(f"'{text}' names no pixel; give FRAME:X,Y or FRAME:X,Y=ALBEDO")
     return text
 
 
 def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str, Any]]:
-    """The run that was asked for, `stages` as fields of `Asked`: called with capture, result, settings and progress."""
+    """The requested run, `stages` as fields of `Request`: called with capture, result, settings and progress."""
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
     reading = reading_from(arguments)
     with needed_packages():
-        from ..core.pipeline.run import Asked
+        from ..core.pipeline.run import Request
 
         corrections = {
             "override": arguments.override,
             "heed_kept": not arguments.no_overrides,
             "white": arguments.white,
         }
-        asked = Asked(reading=reading, **corrections, **stages)
-        asked.check(arguments.capture, arguments.out)
+        request = Request(reading=reading, **corrections, **stages)
+        request.check(arguments.capture, arguments.out)
         if arguments.scene:
-            return partial(need("job.run").run, asked=asked)
+            return partial(need("job.run").run, request=request)
         from ..api import run_without_scene
 
-        return partial(run_without_scene, asked=asked, unwrap=arguments.unwrap)
+        return partial(run_without_scene, request=request, unwrap=arguments.unwrap)
 
 
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:

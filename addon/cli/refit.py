@@ -1,4 +1,4 @@
-"""What the command line knows of corrections: the options for them, and the command `refit`."""
+"""Corrections on the command line: their options, and the command `refit`."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ from .common import add_common, console_run, need, tell_end
 
 
 def add_override(parser: argparse.ArgumentParser) -> None:
-    """The options by which a run is given what is known of objects."""
+    """Add the options that give a run what is known of objects."""
     known = "JSON of what is known of objects; merged into RESULT/overrides.json, which runs heed"
     parser.add_argument("--override", metavar="FILE", type=Path, help=known)
     parser.add_argument("--no-overrides", action="store_true", help="don't heed what RESULT/overrides.json keeps")

@@ -1,4 +1,4 @@
-"""The command `relight` of the command line: its options, and from them to what the bridge does."""
+"""The command `relight`: its options, and the calls of the bridge that they stand for."""
 
 import argparse
 from pathlib import Path

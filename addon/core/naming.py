@@ -3,7 +3,7 @@
 from .errors import one_line
 from .kinds import Code
 
-LONGEST: Code[int] = 48
+MAX_LENGTH: Code[int] = 48
 """Bytes of a name in UTF-8. Blender 4.5 cuts names at 63: this leaves room for ' base color' and its own '.001'."""
 
 
@@ -15,7 +15,7 @@ def writable(name: str) -> str:
 def object_name(class_name: str, object_id: int) -> str:
     """'<class> <number>', as 'sofa 12'; a long class is cut, the number never, as it alone tells objects apart."""
     number = f" {object_id}"
-    return cut(writable(class_name) or "Object", LONGEST - len(number)) + number
+    return cut(writable(class_name) or "Object", MAX_LENGTH - len(number)) + number
 
 
 def cut(text: str, longest: int) -> str:

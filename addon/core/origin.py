@@ -1,4 +1,4 @@
-"""Which package a thing comes from, and in which version: what other packages bring is heeded by it."""
+"""Which package a function or value comes from, and in which version: what other packages bring is heeded by it."""
 
 import hashlib
 import sys
@@ -10,12 +10,12 @@ from typing import Any
 OWN = __name__.removesuffix("core.origin")
 
 
-def of_point(point: EntryPoint) -> str:
+def package_of_entry_point(point: EntryPoint) -> str:
     """Name and version of the package that has an entry point."""
     return point.value if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
-def of_thing(value: Any) -> str:
+def package_of(value: Any) -> str:
     """The same of a function's package, or of a value's class; "" for what is the program's own.
 
     Of a module that belongs to no package: its name and a hash of its source.

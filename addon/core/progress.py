@@ -37,7 +37,7 @@ class Progress:
     listener : callable(ProgressEvent), optional
         Called from the thread that runs the stages.
     should_stop : callable() -> bool, optional
-        Asked at every update.
+        Called at every update.
     weights : dict of str to float, optional
         Expected cost of each stage, in any unit; stages not named count 1.
     """

@@ -1,1 +1,1 @@
-"""A recovery on many machines: work as engines that exist take it. The work itself is `core/pipeline`'s; no Blender."""
+"""A recovery on many machines, as jobs of existing render-farm engines. `core/pipeline` does the work; no Blender."""

@@ -1,4 +1,4 @@
-"""The farm's commands: `stage` is a unit of work; `plan`, `submit` and `status` are about rooms of them."""
+"""The farm's commands: `stage` does one unit of work; `plan`, `submit` and `status` handle whole rooms."""
 
 import argparse
 import json
@@ -16,7 +16,7 @@ from ..cli.common import (
     settings_from,
     tell_end,
 )
-from ..cli.recover import add_home, run_from
+from ..cli.recover import add_result_options, run_from
 from ..console import duration
 from ..core.errors import EXIT_OK, BadInputError, ScanRelightError
 from ..core.stages import RUN_STAGES, WRITE
@@ -40,7 +40,7 @@ def add_farm(commands) -> None:
     block = "of the stage, the I-th of N parts alone; the stage without --block joins them"
     unit.add_argument("--block", metavar="I/N", type=_block, help=block)
     add_reading(unit)
-    add_home(unit)
+    add_result_options(unit)
     add_settings(unit)
     add_common(unit, stage_command, leash=True)
 
@@ -89,7 +89,7 @@ def _add_rooms(parser: argparse.ArgumentParser) -> None:
     add("--blocks", metavar="N", type=int, default=1, help="parts of a stage that can be divided (default 1)")
     add("--program", metavar="COMMAND", default=PROGRAM, help=f"what a worker calls (default {PROGRAM})")
     add_reading(parser)
-    add_home(parser)
+    add_result_options(parser)
     add_settings(parser)
 
 
@@ -101,7 +101,7 @@ def _block(text: str) -> tuple[int, int]:
 
 
 def options_of(arguments: argparse.Namespace) -> list[str]:
-    """The options of a unit of work that say the same as `arguments`; paths in them are absolute."""
+    """The options that pass `arguments` on to a unit of work; paths in them are absolute."""
     given = [f"--preset={arguments.preset}"]
     for info in setting_infos():
         value, option = getattr(arguments, info.name), info.name.replace("_", "-")
@@ -186,9 +186,9 @@ def _hand_over(arguments: argparse.Namespace, room: Room) -> str:
 
 def status_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`status RESULT...`."""
-    from .status import FAILED, look, page, table
+    from .status import FAILED, page, room_state, table
 
-    rooms = [look(result) for result in arguments.results]
+    rooms = [room_state(result) for result in arguments.results]
     if arguments.page:
         from ..core.atomic import write_bytes
 

@@ -17,27 +17,27 @@ SCRIPT = Path(__file__).parent / "scan_relight.js"
 JOB_TYPE: Code[str] = "scan-relight"
 """What the manager makes of the script's name."""
 MANAGER: Code[str] = "http://localhost:8080/"
-SECONDS: Shown[float] = 30.0
+TIMEOUT: Shown[float] = 30.0
 """How long the manager may take for an answer."""
 PATHS = ("mesh", "exposures", "override")
-LONGEST: Shown[int] = 1 << 24
+MAX_ANSWER_BYTES: Shown[int] = 1 << 24
 """Bytes of an answer that are read."""
 NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."
 
 
-def _ask(address: str, path: str, content: dict[str, Any] | None = None) -> Any:
-    """The manager's answer; LookupError where it knows no such way."""
+def _send(address: str, path: str, content: dict[str, Any] | None = None) -> Any:
+    """Send a request to the manager and return its answer, parsed JSON; raises LookupError on status 404."""
     data = None if content is None else json.dumps(content).encode()
     headers = {"Content-Type": "application/json", "Accept": "application/json"}
     try:
         if urllib.parse.urlsplit(address).scheme not in ("http", "https"):
             raise BadInputError(f"'{address}' is no manager's address; give --manager as {MANAGER}.")
         request = urllib.request.Request(urllib.parse.urljoin(address.rstrip("/") + "/", path), data, headers)
-        with urllib.request.urlopen(request, timeout=SECONDS) as answer:
-            return json.loads(answer.read(LONGEST))
+        with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
+            return json.loads(answer.read(MAX_ANSWER_BYTES))
     except urllib.error.HTTPError as error:
         with error:
-            message = _message(error.read(LONGEST))
+            message = _message(error.read(MAX_ANSWER_BYTES))
         if error.code == 404:
             raise LookupError(message) from error
         raise BadInputError(f"Flamenco's manager at {address} refused ({error.code}): {message}.") from error
@@ -78,7 +78,7 @@ def submit(room: Room, address: str = "", priority: int = 50) -> str:
     """Hand a room to the manager at an address; returns the job's number. Raises `BadInputError`."""
     address = address or MANAGER
     try:
-        known = _ask(address, f"api/v3/jobs/type/{JOB_TYPE}")
+        known = _send(address, f"api/v3/jobs/type/{JOB_TYPE}")
     except LookupError as error:
         raise BadInputError(
             f"Flamenco's manager at {address} has no job type '{JOB_TYPE}'; put {SCRIPT} into its folder "
@@ -86,6 +86,6 @@ def submit(room: Room, address: str = "", priority: int = 50) -> str:
         ) from error
     etag = str(known.get("etag", "")) if isinstance(known, dict) else ""
     try:
-        return str(_ask(address, "api/v3/jobs", job_of(room, etag, priority))["id"])
+        return str(_send(address, "api/v3/jobs", job_of(room, etag, priority))["id"])
     except (LookupError, TypeError) as error:
         raise BadInputError(NO_MANAGER.format(address)) from error

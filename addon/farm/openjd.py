@@ -1,4 +1,4 @@
-"""Open Job Description: a room as a job template, which Deadline Cloud and others run; `openjd run` does it here."""
+"""Open Job Description: a room as a job template, which Deadline Cloud and others run; `openjd run` runs it locally."""
 
 from pathlib import Path
 from typing import Any

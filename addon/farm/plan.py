@@ -1,4 +1,4 @@
-"""The graph of a room's units of work: what every engine is given in its own language."""
+"""The graph of a room's units of work, which each engine is given in its own format."""
 
 import json
 import shlex
@@ -44,13 +44,13 @@ class Room:
     capture, result : Path
         Absolute, as the workers find them.
     blocks : int
-        Into how many a stage is divided that can be.
+        Number of blocks into which a stage is divided, if it can be.
     program : tuple of str
-        What runs a command of ours on a worker.
+        Command that starts Scan Relight on a worker.
     options : tuple of str
         The options of each unit: settings, how the capture is read.
     divided : tuple of str
-        The stages that are, by blocks.
+        The stages that are divided into blocks.
     """
 
     capture: Path
@@ -62,12 +62,12 @@ class Room:
 
     @property
     def name(self) -> str:
-        """What the room is called."""
+        """Name of the room."""
         return self.result.name
 
     @property
     def farm(self) -> Path:
-        """Where the plan, locks, marks and logs are."""
+        """Folder of the plan, locks, marks and logs."""
         return self.result / FOLDER
 
     def tasks(self) -> tuple[Task, ...]:
@@ -117,7 +117,7 @@ class Room:
 
 
 def unit_name(stage: str, block: tuple[int, int] | None) -> str:
-    """What a unit of work is called."""
+    """Name of a unit of work."""
     return f"{stage}-{block[0]}-of-{block[1]}" if block else stage
 
 
@@ -135,7 +135,7 @@ def make_folder(folder: Path) -> None:
 
 def rooms_from(
     captures: list[Path],
-    listed: Path | None,
+    list_file: Path | None,
     results: Path,
     blocks: int,
     program: str,
@@ -147,9 +147,9 @@ def rooms_from(
     Parameters
     ----------
     captures : list of Path
-        Their result folders are called as they are, below `results`.
-    listed : Path, optional
-        File with a capture in each line, and behind a tab its result folder, if it is another.
+        Their result folders have the same names, in `results`.
+    list_file : Path, optional
+        File with a capture in each line, followed by a tab and its result folder if that is not the default.
     program : str
         As a shell would split it.
 
@@ -160,23 +160,23 @@ def rooms_from(
     """
     if blocks < 1:
         raise BadInputError(f"A stage can't be divided into {blocks} blocks; give 1 or more.")
-    wanted = [(capture, results / capture.absolute().name) for capture in captures]
-    if listed is not None:
+    folders = [(capture, results / capture.absolute().name) for capture in captures]
+    if list_file is not None:
         try:
-            lines = listed.read_text(encoding="utf-8").splitlines()
+            lines = list_file.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            raise BadInputError(f"List of rooms '{listed}' can't be read ({error}); give a text file.") from error
+            raise BadInputError(f"List of rooms '{list_file}' can't be read ({error}); give a text file.") from error
         for line in filter(str.strip, lines):
             capture, _, result = line.partition("\t")
-            folder = listed.parent / capture.strip()
-            wanted.append(
-                (folder, listed.parent / result.strip() if result.strip() else results / folder.absolute().name)
+            folder = list_file.parent / capture.strip()
+            folders.append(
+                (folder, list_file.parent / result.strip() if result.strip() else results / folder.absolute().name)
             )
-    if not wanted:
+    if not folders:
         raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
     command = tuple(shlex.split(program)) or (PROGRAM,)
     shared = blocks, command, tuple(options), divided
-    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in wanted]
+    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in folders]
     taken: dict[Path, Path] = {}
     for room in rooms:
         if room.result.resolve() == room.capture.resolve():

@@ -1,4 +1,4 @@
-"""Slurm: each unit of work is a job, blocks are a job array, and `afterok` makes the chain of a room."""
+"""Slurm: each unit of work is a job, blocks are a job array, and `afterok` chains the jobs of a room."""
 
 import re
 import shlex
@@ -11,13 +11,13 @@ from .plan import Room, Task
 def submit(room: Room, limits: dict[str, str]) -> list[str]:
     """Submit a room as a chain of jobs; returns their numbers.
 
-    Their scripts and logs lie in the room's farm folder. A room is a chain of its own: where one of its jobs fails, its
-    later ones are taken off, and no other room's are.
+    Their scripts and logs lie in the room's farm folder. Each room is a chain of its own: where one of its jobs fails,
+    only the later jobs of that room are cancelled.
 
     Parameters
     ----------
     limits : dict of str to str
-        What jobs ask for, by sbatch's options; '' leaves it to the partition.
+        Resources that jobs request, by sbatch's options; '' leaves them to the partition.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def submit(room: Room, limits: dict[str, str]) -> list[str]:
 
 
 def _first(task: Task) -> str | None:
-    """The block of a task's stage that stands for the whole array; None for the first itself, and for no block."""
+    """Name of the block that is submitted for a task's whole array; None for that block itself, and without blocks."""
     return None if task.block is None or task.block[0] == 1 else task.name.replace(f"-{task.block[0]}-of", "-1-of")
 
 

@@ -1,4 +1,4 @@
-"""How far rooms are, read off the marks and locks in their result folders; no capture is read, no clock is asked."""
+"""Progress of rooms, from the marks and locks in their result folders; reads no capture and no clock."""
 
 import html
 import json
@@ -22,7 +22,7 @@ PAGE = "report.html"
 
 @dataclass(frozen=True)
 class UnitState:
-    """A unit of work: its name, its state, who does it or did, its time, memory and error."""
+    """A unit of work: name, state, the machine that does it or did, time, memory and error."""
 
     name: str
     stage: str
@@ -35,7 +35,7 @@ class UnitState:
 
 @dataclass(frozen=True)
 class RoomState:
-    """A room: its result folder, its state, the stage that it is in, the share that is done, and its units."""
+    """A room: result folder, state, current stage, share that is done, and units."""
 
     result: Path
     state: str
@@ -51,29 +51,29 @@ class RoomState:
         return entry | {"share": round(self.share, 4), "error": self.error, "units": units}
 
 
-def look(result: Path) -> RoomState:
-    """How far a room is; a folder without a plan is no error."""
+def room_state(result: Path) -> RoomState:
+    """The progress of a room; a folder without a plan is no error."""
     try:
         plan = json.loads((result / FOLDER / "plan.json").read_text(encoding="utf-8"))
-        named = [(str(task["name"]), str(task["stage"])) for task in plan["tasks"]]
+        task_names = [(str(task["name"]), str(task["stage"])) for task in plan["tasks"]]
     except FileNotFoundError:
-        named = [(stage, stage) for stage in RUN_STAGES] if (result / FOLDER).is_dir() else []
+        task_names = [(stage, stage) for stage in RUN_STAGES] if (result / FOLDER).is_dir() else []
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"Its plan can't be read ({type(error).__name__}); submit it again."
         return RoomState(result, FAILED, "", 0.0, message, ())
-    if not named:
+    if not task_names:
         done = (result / REPORT).is_file()  # by one machine
         return RoomState(result, DONE if done else UNKNOWN, "", float(done), "", ())
-    units = [_unit(result, name, stage) for name, stage in named]
+    units = [_unit(result, name, stage) for name, stage in task_names]
     # What was joined needs its blocks no more.
     joined = {unit.stage for unit in units if unit.name == unit.stage and unit.state == DONE}
     units = [UnitState(**(vars(unit) | {"state": DONE})) if unit.stage in joined else unit for unit in units]
     cost = [COST.get(unit.stage, 1) / sum(sibling.stage == unit.stage for sibling in units) for unit in units]
     share = sum(c for c, unit in zip(cost, units, strict=True) if unit.state == DONE) / sum(cost)
-    left = [unit for unit in units if unit.state != DONE]
-    state = next((s for s in (RUNNING, FAILED, WAITING) if any(unit.state == s for unit in left)), DONE)
-    stage = next((unit.stage for unit in left if unit.state == state), "")
-    error = next((unit.error for unit in left if unit.state == FAILED), "")
+    unfinished = [unit for unit in units if unit.state != DONE]
+    state = next((s for s in (RUNNING, FAILED, WAITING) if any(unit.state == s for unit in unfinished)), DONE)
+    stage = next((unit.stage for unit in unfinished if unit.state == state), "")
+    error = next((unit.error for unit in unfinished if unit.state == FAILED), "")
     return RoomState(result, state, stage, share, error, tuple(units))
 
 
@@ -104,7 +104,7 @@ def table(rooms: list[RoomState]) -> str:
 
 
 def page(rooms: list[RoomState], folder: Path) -> str:
-    """An HTML page over all rooms, which lies in `folder`: it names the rooms' pages by their way from there."""
+    """An HTML page over all rooms, which lies in `folder`: it links to the rooms' pages by relative paths."""
     body = []
     for room in rooms:
         name, page_path = html.escape(room.result.name), room.result.absolute() / PAGE

@@ -46,7 +46,7 @@ def unit(result: Path, stage: str, block: tuple[int, int] | None, should_stop: C
 
 
 def stored_key(result: Path, name: str) -> str | None:
-    """The key of what a unit has stored; None where it stores nothing, or nothing whole."""
+    """The key of a unit's stored result; None where it stores none, or that is damaged."""
     try:
         return read_archive(result / STORED / f"{name}.npz", ())[0]["key"]
     except (OSError, Damaged, KeyError, TypeError):

@@ -6,10 +6,10 @@ import bpy
 from mathutils import Vector
 
 from ...addon.bridge.corrections import corrections, known_white, refitted, unseen
+from ...addon.bridge.custom_properties import OBJECT_ID
 from ...addon.bridge.job import job as jobs
 from ...addon.bridge.job.command import command
 from ...addon.bridge.light.room import cast, depsgraph_of
-from ...addon.bridge.marks import OBJECT_ID
 from ...addon.bridge.results import file
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError, ScanRelightError
@@ -308,12 +308,12 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
 
     def state(self, context, objects):
         hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
-        if hit is None or not corrections.correctable(hit.thing):
+        if hit is None or not corrections.correctable(hit.obj):
             raise BadInputError("There is no recovered object at that spot; click on one.")
-        albedo = known_white.of_object(hit.thing, hit.place, tuple(self.albedo), depsgraph_of(context.scene))
-        corrections.say_white(hit.thing, albedo)
-        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.thing.name}'")
-        return [hit.thing]
+        albedo = known_white.of_object(hit.obj, hit.location, tuple(self.albedo), depsgraph_of(context.scene))
+        corrections.say_white(hit.obj, albedo)
+        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.obj.name}'")
+        return [hit.obj]
 
     def _end(self, context) -> None:
         self._picking = False

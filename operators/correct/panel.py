@@ -3,7 +3,7 @@
 import bpy
 
 from ...addon.bridge.corrections import corrections, unseen
-from ...addon.core.brdf.registry import named, shown
+from ...addon.core.brdf.registry import find_or_lambertian, named
 from ...addon.core.photo import MIDDLE_GREY
 from ..base.job_operator import active, bar
 from ..base.panel import SidebarPanel, fields
@@ -60,7 +60,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
 
     def values(self, layout, obj) -> None:
         """Each value with a pin where it is given, and a button to reset it."""
-        given, brdf = corrections.given(obj), shown(corrections.effective(obj)["model"])
+        given, brdf = corrections.given(obj), find_or_lambertian(corrections.effective(obj)["model"])
         values, metal = obj.scan_relight_correct, brdf.lobe_alone
         rows = [("model", "model")]
         if brdf.has_lobe:

@@ -9,7 +9,7 @@ import bpy
 
 from ...addon.bridge.corrections import corrections
 from ...addon.core.brdf.lambertian import LAMBERTIAN
-from ...addon.core.brdf.registry import models, shown
+from ...addon.core.brdf.registry import find_or_lambertian, models
 from ...addon.core.errors import ScanRelightError
 
 _GIVEN = [brdf for brdf in models() if brdf.can_be_given]
@@ -67,7 +67,7 @@ def _f0(group) -> float:
 
 
 def _colour(group):
-    lobe_alone = shown(_value(group, "model", "")).lobe_alone
+    lobe_alone = find_or_lambertian(_value(group, "model", "")).lobe_alone
     value = _value(group, "f0" if lobe_alone else "base_color", (0.5, 0.5, 0.5))
     return tuple(value) if hasattr(value, "__len__") else (value,) * 3
 
@@ -76,7 +76,7 @@ def _give_colour(group, value) -> None:
     colour = list(value)
     for obj in targets(bpy.context, group.id_data):
         if corrections.correctable(obj):
-            brdf = shown(corrections.effective(obj)["model"])
+            brdf = find_or_lambertian(corrections.effective(obj)["model"])
             corrections.give(obj, **{"f0" if brdf.lobe_alone else "base_color": colour})
 
 

@@ -2,10 +2,10 @@
 
 import bpy
 
+from ...addon.bridge.custom_properties import OWN_SCENE
 from ...addon.bridge.job import job as jobs
-from ...addon.bridge.marks import OWN_SCENE
 from ...addon.bridge.results import changes as room_changes
-from ...addon.bridge.results import home, images
+from ...addon.bridge.results import default_folders, images
 from ...addon.console import duration
 from ...addon.core.kinds import Shown
 from ...addon.core.results.unfinished import goes_on_with
@@ -62,7 +62,9 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
             self.say(
-                layout, f"Goes into '{home.display_path(preferences.chosen_result(context.scene))}'.", "FILE_FOLDER"
+                layout,
+                f"Goes into '{default_folders.display_path(preferences.chosen_result(context.scene))}'.",
+                "FILE_FOLDER",
             )
         layout.prop(choices, "images")
         if choices.images == images.FOLDER and not bpy.data.filepath:

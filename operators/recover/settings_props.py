@@ -8,7 +8,7 @@ from functools import cache
 import bpy
 
 from ...addon.bridge.job.command import command
-from ...addon.bridge.results import home
+from ...addon.bridge.results import default_folders
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError
 from ...addon.core.settings import PRESETS, Settings
@@ -160,7 +160,7 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
             raise BadInputError(f"Choose the {name.replace('_', ' ')} first.")
         folder = bpy.path.abspath(value)
         if name == "result_folder":
-            home.check(folder)
+            default_folders.check(folder)
         return folder
 
 
@@ -194,9 +194,9 @@ class StageOperator(SettingsProps, CaptureOperator):
     def run(self, context, until: str, **options) -> dict:
         """Run the stages up to `until` here; returns the report. `options` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
-        from ...addon.core.pipeline.run import Asked, progress_of_run  # not earlier: Blender's start should not wait
+        from ...addon.core.pipeline.run import Request, progress_of_run  # not earlier: Blender's start should not wait
 
-        settings, request = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
+        settings, request = self.settings(), Request(until, self.first_stage(), reading=reading_props.reading(self))
         folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
             return run(*folders, settings, progress_of_run(should_stop=guard), request, **options)

@@ -8,7 +8,7 @@ import bpy
 
 from ...addon.bridge.corrections.corrections import keep_for_run
 from ...addon.bridge.job.command import command
-from ...addon.bridge.results import home
+from ...addon.bridge.results import default_folders
 from ...addon.core.errors import ScanRelightError
 from .. import preferences
 from ..base.operator import AtOnce, OneSentence, folder_property, has_capture, has_scene, needs
@@ -243,10 +243,10 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
         folder = (
             Path(bpy.path.abspath(chosen)) / FOLDER
             if chosen
-            else home.capture_folder(preferences.results_folder(), choices.capture_folder)
+            else default_folders.capture_folder(preferences.results_folder(), choices.capture_folder)
         )
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
-        home.check(str(folder))
+        default_folders.check(str(folder))
         warnings = capture_scene(context, folder, context.selected_objects, self.cameras, first, last, self.frame_step)
         choices.capture_folder = str(folder)
         self.report({"INFO"}, f"Captured into {folder}")

@@ -4,7 +4,7 @@ import time
 
 import bpy
 
-from ...addon.bridge.marks import OBJECT_ID
+from ...addon.bridge.custom_properties import OBJECT_ID
 from ...addon.bridge.relight import estimate, exposure
 from ...addon.core.errors import ScanRelightError
 from ...addon.core.kinds import Shown

@@ -152,7 +152,7 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
 
 def put_around(scene, picture: str) -> list[str]:
     """Put a picture around the room, scaled to typical daylight for such a room; returns warnings."""
-    outside.use_hdri(scene, picture, outside.usual_radiance(scene))
+    outside.use_hdri(scene, picture, outside.outdoor_radiance(scene))
     return outside.remarks(scene)
 
 

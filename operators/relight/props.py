@@ -80,7 +80,7 @@ PERCENTAGE = bpy.props.IntProperty(
 )
 
 
-def _kept(read, change) -> dict:
+def _stored_property(read, change) -> dict:
     """Getter and setter of a property that the bridge stores with its owner; the exposure follows a change."""
 
     def set_value(group, value):
@@ -90,9 +90,9 @@ def _kept(read, change) -> dict:
     return {"get": lambda group: read(group.id_data), "set": set_value}
 
 
-def _of_lamp(read, change, default) -> dict:
+def _lamp_property(read, change, default) -> dict:
     """The same for a material, as long as it is a lamp's."""
-    return _kept(
+    return _stored_property(
         lambda material: read(material) if lamps.is_lamp(material) else default,
         lambda material, value: change(material, value) if lamps.is_lamp(material) else None,
     )
@@ -102,14 +102,14 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
     """`Material.scan_relight_lamp`."""
 
     on: bpy.props.BoolProperty(
-        name="On", description="Whether this lamp shines", **_of_lamp(lamps.is_on, lamps.set_on, False)
+        name="On", description="Whether this lamp shines", **_lamp_property(lamps.is_on, lamps.set_on, False)
     )
     factor: bpy.props.FloatProperty(
         name="Strength x",
         description="Times the radiance that the scan found; 1 is the lamp as captured",
         max=lamps.MAX_FACTOR,
         **_FACTOR,
-        **_of_lamp(lamps.factor, lamps.set_factor, 1.0),
+        **_lamp_property(lamps.factor, lamps.set_factor, 1.0),
     )
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
@@ -118,14 +118,14 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
         size=3,
         min=0.0,
         soft_max=1.0,
-        **_of_lamp(lambda material: lamps.colour(material) or (1.0,) * 3, lamps.set_colour, (1.0,) * 3),
+        **_lamp_property(lambda material: lamps.colour(material) or (1.0,) * 3, lamps.set_colour, (1.0,) * 3),
     )
     kelvin: bpy.props.FloatProperty(
         name="Temperature",
         description="Colour of its light as a temperature, at the same luminance: 2700 a warm bulb, 6500 daylight",
         min=LOWEST,
         **_TEMPERATURE,
-        **_of_lamp(lamps.kelvin, lamps.set_kelvin, 6500.0),
+        **_lamp_property(lamps.kelvin, lamps.set_kelvin, 6500.0),
     )
 
 
@@ -136,7 +136,7 @@ class ScanRelightLight(bpy.types.PropertyGroup):
         name="Lumens",
         description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
         **_LUMENS,
-        **_kept(units.lumens, units.set_lumens),
+        **_stored_property(units.lumens, units.set_lumens),
     )
 
 
@@ -146,14 +146,14 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
     on: bpy.props.BoolProperty(
         name="Light from Outside",
         description="Whether light comes in from outside the scanned room",
-        **_kept(outside.is_on, outside.set_on),
+        **_stored_property(outside.is_on, outside.set_on),
     )
     factor: bpy.props.FloatProperty(
         name="Strength",
         description="Times the light from outside that was recovered, or the picture's",
         max=outside.MAX_FACTOR,
         **_FACTOR,
-        **_kept(outside.factor, outside.set_factor),
+        **_stored_property(outside.factor, outside.set_factor),
     )
     rotation: bpy.props.FloatProperty(
         name="Rotation",
@@ -162,7 +162,7 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
         soft_min=-math.pi,
         soft_max=math.pi,
         step=100,
-        **_kept(outside.rotation, outside.set_rotation),
+        **_stored_property(outside.rotation, outside.set_rotation),
     )
 
 

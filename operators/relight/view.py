@@ -7,10 +7,10 @@ from pathlib import Path
 
 import bpy
 
+from ...addon.bridge.custom_properties import OBJECT_ID
 from ...addon.bridge.data.cameras import frame_cameras, track_cameras, use_camera
 from ...addon.bridge.job.command import command
 from ...addon.bridge.light.room import cast
-from ...addon.bridge.marks import OBJECT_ID
 from ...addon.bridge.relight import before_after, match_frame, pictures
 from ...addon.bridge.relight import virtual_object as virtual
 from ...addon.bridge.render_device import current_device

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import bpy
 
-from ...addon.bridge.results import find, home, images
+from ...addon.bridge.results import default_folders, find, images
 from ...addon.core.errors import BadInputError
 from .. import preferences
 from ..base.operator import FOLDERS, AtOnce, Choosing, folder_property, needs, no_run
@@ -103,7 +103,7 @@ def folders(scene: bpy.types.Scene | None) -> list[Path]:
     """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
     from ...addon.core.results.cache import results as results_below
 
-    folder_beside = home.folder_beside_file()
+    folder_beside = default_folders.folder_beside_file()
     own_folder = summary.folder_of(scene) if scene is not None else None
     return [
         *results_below(preferences.results_folder()),

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ...addon.bridge.marks import OBJECT_ID
+from ...addon.bridge.custom_properties import OBJECT_ID
 from ...addon.bridge.results import look
 from ...addon.core.errors import BadInputError
 from ..base.operator import AtOnce, has_scene, needs, object_mode

@@ -8,7 +8,7 @@ import bpy
 
 from ...addon.bridge.results import file, look
 from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNKNOWN, Result, result_state, result_states
-from ...addon.core.brdf.registry import find, shown
+from ...addon.core.brdf.registry import find, find_or_lambertian
 from ...addon.core.kinds import Shown
 from .. import preferences
 
@@ -82,7 +82,7 @@ def interval_width(entry: dict[str, Any]) -> float | None:
     """Uncertainty of an object's material, 0...1: of its roughness, or half of its relative albedo; None if unknown."""
     widths = []
     low, high = entry.get("roughness_low"), entry.get("roughness_high")
-    brdf = shown(entry.get("model"))
+    brdf = find_or_lambertian(entry.get("model"))
     if brdf.has_lobe and None not in (low, high):
         widths.append(high - low)
     evidence = entry.get("evidence") or {}
@@ -115,7 +115,7 @@ def _mean(value) -> float | None:
 def facts(entry: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of all facts that the panel shows of an object."""
     name, evidence = entry.get("model", ""), entry.get("evidence") or {}
-    brdf = shown(name)
+    brdf = find_or_lambertian(name)
     rows = [("Model", label(name))]
     alpha = entry.get("alpha")
     if alpha is not None:

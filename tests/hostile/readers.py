@@ -207,7 +207,7 @@ def result(name: str) -> Reader:
 
     def make(root: Path) -> Path:
         from addon.core.pipeline.stages import code
-        from addon.core.results.place import write_capture
+        from addon.core.results.result_folders import write_capture
         from addon.core.results.room_file import write_room
         from addon.core.results.store import Store
         from addon.core.scene.model import Capture, Instance, Mesh

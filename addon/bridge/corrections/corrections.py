@@ -1,7 +1,7 @@
 """What the artist says of recovered objects: kept with them, shown at once, written beside the result for a refit.
 
-An object's property `marks.GIVEN` holds it, so that it is saved and undone with the scene. The result folder's
-`overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
+An object's property `custom_properties.GIVEN` holds it, so that it is saved and undone with the scene. The result
+folder's `overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
 """
 
 import json
@@ -13,12 +13,12 @@ import bpy
 
 from ...core.atomic import write_bytes
 from ...core.brdf.dielectric import DIELECTRIC
-from ...core.brdf.registry import shown
+from ...core.brdf.registry import find_or_lambertian
 from ...core.errors import BadInputError
 from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
-from ...core.results.place import write_capture
-from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
+from ...core.results.result_folders import write_capture
+from ..custom_properties import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
 from . import material, unseen
@@ -122,7 +122,7 @@ def by_id(obj: bpy.types.Object, object_id: int) -> bpy.types.Object | None:
 
 
 def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:
-    """The values found of an object (`material.found`), overridden by those given."""
+    """The values recovered of an object (`material.recovered_values`), overridden by those given."""
     override = given(obj)
     source = by_id(obj, override["same_as"]) if override.get("same_as") is not None else None
     copied = {}
@@ -133,7 +133,7 @@ def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[s
     previous_model = values["model"]
     values |= copied
     values |= {key: override[key] for key in (*LOBE, "base_color") if key in override}
-    model = shown(values["model"])
+    model = find_or_lambertian(values["model"])
     if "model" not in override and {"f0", "roughness"} & override.keys() and model.has_albedo and not model.has_lobe:
         model = DIELECTRIC
         values["model"] = model.name
@@ -152,7 +152,7 @@ def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[s
 
 def _base_values(obj: bpy.types.Object, override: dict, model: str | None) -> dict[str, Any]:
     """The values that an override replaces: fitted by the run to that model, else found before one was given."""
-    original, worn = material.found(obj), material.worn(obj)
+    original, worn = material.recovered_values(obj), material.worn(obj)
     if worn["model"] != (model or original["model"]):
         return original
     withdrawn = (entry(obj).get("given") or {}).keys() - override.keys()  # given to the run, and not any more
@@ -164,7 +164,7 @@ def show(obj: bpy.types.Object) -> None:
     if correctable(obj):
         with our_own(material.worn_material(obj)):
             material.show(obj, effective(obj))
-        if not given(obj) and material.found(obj) == material.worn(obj):
+        if not given(obj) and material.recovered_values(obj) == material.worn(obj):
             obj.pop(FOUND, None)
 
 

@@ -1,7 +1,7 @@
 """The material of a corrected object: what is given laid over what was found, and back.
 
-Before the first change the object notes what was found (`marks.FOUND`) and the material what it showed, so that the way
-back needs neither the result folder nor this add-on's memory.
+Before the first change the object stores what was found (`custom_properties.FOUND`), and the material what it showed:
+to go back needs neither the result folder nor this add-on's memory.
 """
 
 import json
@@ -11,8 +11,9 @@ import bpy
 
 from ...core.brdf.compensation import ior_of
 from ...core.brdf.lambertian import LAMBERTIAN
-from ...core.brdf.registry import shown
+from ...core.brdf.registry import find_or_lambertian
 from ...core.results.overrides import LOBE
+from ..custom_properties import FOUND
 from ..data.materials import (
     BASE_COLOR,
     EMISSION_STRENGTH,
@@ -26,7 +27,6 @@ from ..data.materials import (
     principled,
 )
 from ..data.nodes import feed, mix_node
-from ..marks import FOUND
 from ..results import file
 
 WORN = "scan_relight_worn"
@@ -53,8 +53,8 @@ def entry(obj: bpy.types.Object) -> dict[str, Any]:
     return file.rows([obj]).get(obj, {})
 
 
-def found(obj: bpy.types.Object) -> dict[str, Any]:
-    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
+def recovered_values(obj: bpy.types.Object) -> dict[str, Any]:
+    """`model`, `roughness`, `f0` and `base_color` as they were recovered; None where the model has none."""
     return worn(obj) | json.loads(obj.get(FOUND, "{}"))
 
 
@@ -98,7 +98,7 @@ def show(obj: bpy.types.Object, values: dict[str, Any]) -> None:
     if values == original:
         del material[WORN]
         return
-    inputs, model = principled(material).inputs, shown(values["model"])
+    inputs, model = principled(material).inputs, find_or_lambertian(values["model"])
     if values["model"] != original["model"]:
         inputs[METALLIC].default_value = float(model.lobe_alone)
         inputs[SPECULAR_LEVEL].default_value = 0.5 if model.has_lobe else 0.0

@@ -8,11 +8,11 @@ import bpy
 
 from ...core.errors import MissingStageError
 from ...core.results.room_file import material
+from ..custom_properties import IMAGE, OBJECT_ID, RESULT, UV_MAP, set_run
 from ..data.images import tiles_of
 from ..data.materials import dress
 from ..data.mesh_objects import is_open
 from ..light import lamps
-from ..marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
 from ..refused import refused, sentences
 from ..results import changes, file
 from ..results import images as result_images
@@ -87,7 +87,7 @@ def bringing(
         yield done / max(len(objects), 1)
         object_id = obj[OBJECT_ID]
         entry = after.objects.get(object_id)
-        mark(obj, folder, run)
+        set_run(obj, folder, run)
         if entry is not None and any(entry.get(key) != before.get(object_id, {}).get(key) for key in _MATERIAL_KEYS):
             if is_corrected(worn_material(obj)):
                 edited.append(obj.name)
@@ -97,7 +97,7 @@ def bringing(
             warnings += corrections.reapply(obj)
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
-            mark(collection, folder, run)
+            set_run(collection, folder, run)
             changes.store_findings(collection, changes.read_findings(folder))
     return (*warnings, *sentences((edited, "the material was edited by hand and stays")))
 

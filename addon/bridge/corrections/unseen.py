@@ -16,12 +16,12 @@ from ...core.errors import BadInputError
 from ...core.scene.atlas import Atlas
 from ...core.scene.model import Mesh
 from ...core.significance import LEVELS
+from ..custom_properties import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
 from ..data.arrays import layer_of, triangles_of, vertices_of
 from ..data.images import DATA, array_image, image_array, load_image
 from ..data.materials import BASE_COLOR, principled
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import image_node
-from ..marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
 from ..refused import refused, sentences
 from ..results import images
 from ..scene.as_made import our_own

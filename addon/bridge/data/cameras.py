@@ -14,11 +14,11 @@ from mathutils import Matrix
 
 from ...core.kinds import Code, Shown, Unit
 from ...core.scene.lens import Lens
+from ...core.scene.lens_json import lens_from_json, lens_to_json
 from ...core.scene.lenses import Cropped, Equirectangular
-from ...core.scene.lenses_told import lens_of, told_lens
 from ...core.scene.model import Camera, Frame, Mesh
 from ...core.scene.pixel_rays import widest_angle
-from ..marks import CAPTURE
+from ..custom_properties import CAPTURE
 
 LENS = "lens_model"
 """Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
@@ -137,12 +137,12 @@ def size_warning(frames: Iterable[Frame]) -> str:
     )
 
 
-def kept_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
+def stored_lens(camera: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
     """The lens that `make_cameras` left with a camera, and its fx, fy, cx, cy; None where it left none."""
     try:
         lens, pixels = json.loads(camera[LENS])
         fx, fy, cx, cy = map(float, pixels)
-        return lens_of(lens), (fx, fy, cx, cy)
+        return lens_from_json(lens), (fx, fy, cx, cy)
     except (KeyError, TypeError, ValueError):
         return None
 
@@ -261,7 +261,7 @@ def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bp
     obj.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
     obj["width"], obj["height"], obj["pixel_aspect"] = camera.width, camera.height, aspect
     if camera.lens is not None:
-        obj[LENS] = json.dumps([told_lens(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
+        obj[LENS] = json.dumps([lens_to_json(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
     collection.objects.link(obj)
     return obj
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...core.brdf.material import ObjectMaterial
 from ...core.errors import BadInputError
-from ...core.naming import LONGEST, cut
+from ...core.naming import MAX_LENGTH, cut
 from ...core.results.room_file import MATERIALS, layout_of
-from ..marks import IMAGE, LAYOUT, UV_MAP
+from ..custom_properties import IMAGE, LAYOUT, UV_MAP
 from .mesh_objects import PARTS_UV
 
 RADIANCE = "Linear Rec.709"
@@ -23,7 +23,7 @@ DATA = "Non-Color"
 def load_image(
     path: Path | str, name: str | None = None, colour_space: str = RADIANCE, keep: bool = True
 ) -> bpy.types.Image:
-    """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
+    """Link an image file of a result folder; it is marked (`custom_properties.IMAGE`) with where it came from.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def load_parts(
 def image_name(room: str, path: Path | str) -> str:
     """Blender's name for an image file of a room: 'kitchen base color', to distinguish two rooms in one file."""
     label = Path(path).stem.replace("_", " ")
-    return f"{cut(room, LONGEST - 8) or 'room'} {label}"
+    return f"{cut(room, MAX_LENGTH - 8) or 'room'} {label}"
 
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:

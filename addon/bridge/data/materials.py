@@ -5,7 +5,7 @@ import bpy
 from ...core.brdf.material import ObjectMaterial
 from ...core.brdf.model import Brdf
 from ...core.brdf.registry import find
-from ..marks import UV_MAP
+from ..custom_properties import UV_MAP
 from .mesh_objects import ATLAS_UV
 from .nodes import add_node, feed, find_node, fresh_tree, mix_node
 

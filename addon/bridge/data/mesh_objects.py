@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.groups import by_number
 from ...core.scene.model import Instance, Mesh
-from ..marks import OBJECT_ID
+from ..custom_properties import OBJECT_ID
 from .arrays import make_mesh, read, set_layer
 
 ATLAS_UV = "ScanRelight"

@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 
 from ...core.io.folder import capture_name
+from ..custom_properties import RESULT
 from ..data.materials import MODEL
-from ..marks import RESULT
 
 TAG = "Scan Relight"
 

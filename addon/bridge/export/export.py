@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 
 from ...core.errors import BadInputError
+from ..custom_properties import OBJECT_ID
 from ..data.added import AddedData
 from ..data.arrays import faces_of, layer_of
 from ..data.materials import MODEL, opacity
 from ..data.mesh_objects import PARTS_UV
 from ..data.names import split_number
-from ..marks import OBJECT_ID
 from ..refused import refused
 from .material import plain_copy
 

@@ -9,6 +9,7 @@ from ...core.brdf.compensation import ior_of
 from ...core.io.png import write_png
 from ...core.kinds import Code
 from ...core.photo import encoded
+from ..custom_properties import IMAGE, UV_MAP
 from ..data.images import UDIM, image_array, load_image
 from ..data.materials import (
     ALPHA,
@@ -26,7 +27,6 @@ from ..data.materials import (
 from ..data.names import split_number
 from ..data.nodes import image_node
 from ..light import lamps
-from ..marks import IMAGE, UV_MAP
 
 WHOLE = "base_color.exr"
 """The room's one image, beside its tiles."""

@@ -14,7 +14,7 @@ from ...core.io.folder import REPORT, SCENE
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
 from ...core.pipeline.refit import Refit, open_result
-from ...core.pipeline.run import WHOLE, Asked, Run, package_versions, told_in_a_sentence
+from ...core.pipeline.run import WHOLE, Request, Run, package_versions, storage_errors_as_sentences
 from ...core.progress import Progress
 from ...core.results.overrides import OVERRIDES
 from ...core.results.store import Store
@@ -36,10 +36,10 @@ def run(
     out_folder: Path | str,
     settings: Settings,
     progress: Progress,
-    asked: Asked = WHOLE,
+    request: Request = WHOLE,
     fresh: bool = True,
 ) -> dict:
-    """Recover a capture as far as is asked; stages that the result folder holds already are not done again.
+    """Recover a capture as far as is requested; stages that the result folder holds already are not done again.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def run(
         One sentence for the user.
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
-    asked.check(capture_folder, out_folder)
+    request.check(capture_folder, out_folder)
     if os.sep == "/" and "\\" in str(out_folder.absolute()):
         raise BadInputError(
             f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
@@ -67,12 +67,12 @@ def run(
         )
     started = time.monotonic()
     progress.stage(READ)
-    capture = read_capture(capture_folder, asked.reading)
-    whole_run = Run(capture, out_folder, settings, progress, asked, versions(), started)
+    capture = read_capture(capture_folder, request.reading)
+    whole_run = Run(capture, out_folder, settings, progress, request, versions(), started)
     with whole_run:
         lay_out = partial(unwrap, polygons=polygons_of(capture.root, capture.mesh))
         report = whole_run.stages(lay_out)
-        return whole_run.write(partial(write_recovered, fresh=fresh)) if asked.until == WRITE else report
+        return whole_run.write(partial(write_recovered, fresh=fresh)) if request.until == WRITE else report
 
 
 def refit(
@@ -83,7 +83,7 @@ def refit(
     heed_kept: bool = True,
     scene: bool = True,
 ) -> dict:
-    """Fit objects of a result again with all else held; `progress` and errors as in `run`, the rest as in `Asked`.
+    """Fit objects of a result again with all else held; `progress` and errors as in `run`, the rest as in `Request`.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def refit(
     started = time.monotonic()
     progress.stage(READ)
     result = open_result(folder, objects, override, heed_kept)
-    with Store(folder) as store, told_in_a_sentence(store.folder):
+    with Store(folder) as store, storage_errors_as_sentences(store.folder):
         refitting = Refit(result, store, progress)
         progress.done()
         refitting.refit()

@@ -164,7 +164,7 @@ def recovered_strength(world: bpy.types.World | None) -> float:
     return float(world.get(_STRENGTH, strength(world))) if world is not None else 0.0
 
 
-def usual_radiance(scene: bpy.types.Scene) -> float:
+def outdoor_radiance(scene: bpy.types.Scene) -> float:
     """Mean radiance that a picture around this room is scaled to, in the frames' unit."""
     return _OUTDOOR_FACTOR * room_light(scene) / math.pi
 

@@ -7,13 +7,13 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.errors import BadInputError
 from ...core.luminance import LUMINANCE
 from ...core.photo import MIDDLE_GREY
+from ..custom_properties import OBJECT_ID
 from ..data.images import image_array
 from ..data.materials import opacity
-from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
@@ -23,12 +23,12 @@ VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
 class Hit(NamedTuple):
-    """Where a ray ends: place and unit normal towards the ray's origin (metres), distance, object."""
+    """Where a ray ends: location and unit normal towards the ray's origin (metres), distance, object."""
 
-    place: Vector
+    location: Vector
     normal: Vector
     distance: float
-    thing: bpy.types.Object
+    obj: bpy.types.Object
 
 
 def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -50,10 +50,10 @@ def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
 def cast(scene: bpy.types.Scene, origin: Vector, direction: Vector, distance: float = 1e4) -> Hit | None:
     """The first surface along a ray."""
     direction = direction.normalized()
-    hit, place, normal, _, obj, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
+    hit, location, normal, _, obj, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
     if not hit:
         return None
-    return Hit(place, -normal if normal.dot(direction) > 0 else normal, (place - origin).length, obj)
+    return Hit(location, -normal if normal.dot(direction) > 0 else normal, (location - origin).length, obj)
 
 
 def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
@@ -62,9 +62,9 @@ def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
         hit = cast(scene, origin, direction)
         if hit is None:
             return True
-        if not any(opacity(slot.material) < 0.5 for slot in hit.thing.material_slots if slot.material):
+        if not any(opacity(slot.material) < 0.5 for slot in hit.obj.material_slots if slot.material):
             return False
-        origin = hit.place + direction.normalized() * 1e-4
+        origin = hit.location + direction.normalized() * 1e-4
     return False
 
 
@@ -99,7 +99,7 @@ def target_of(scene: bpy.types.Scene, kind: str = VIEW, obj: bpy.types.Object | 
     if scene.camera:
         hit = cast(scene, *picture_ray(scene))
         if hit:
-            return hit.place
+            return hit.location
     return (low + high) / 2
 
 
@@ -128,7 +128,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     stored = scene.get(ROOM_LIGHT)
     if stored:
         return float(stored)
-    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / USUAL_ALBEDO
+    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / TYPICAL_ALBEDO
     scene[ROOM_LIGHT] = irradiance
     return irradiance
 

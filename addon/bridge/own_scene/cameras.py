@@ -15,7 +15,7 @@ import numpy as np
 from ...core.errors import BadInputError
 from ...core.io.exr import read_header
 from ...core.scene.model import Camera
-from ..data.cameras import kept_lens
+from ..data.cameras import stored_lens
 
 PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
 """Custom properties of a camera and the fields of its frame that they set; `make_cameras` writes the first."""
@@ -97,7 +97,7 @@ def camera_of(
         The camera is neither a perspective one nor one of `make_cameras`, or its pose is not rigid.
     """
     data = obj.data
-    stored = kept_lens(obj)
+    stored = stored_lens(obj)
     if data.type != "PERSP" and (stored is None or data.type != "PANO"):
         raise BadInputError(f"Camera '{obj.name}' is {data.type.lower()}; frames need perspective cameras.")
     width, height, aspect = dimensions

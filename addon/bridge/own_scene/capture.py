@@ -20,10 +20,10 @@ from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
 from ...core.io.ply import ply_bytes
-from ...core.scene.lenses_told import told_lens
+from ...core.scene.lens_json import lens_to_json
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
-from ..refused import MAX_TOLD, sentences, whole_folder
+from ..refused import MAX_LISTED, sentences, whole_folder
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
@@ -114,8 +114,8 @@ def capture_scene(
     finally:
         if (scene.frame_current, scene.frame_subframe) != current_frame:
             scene.frame_set(current_frame[0], subframe=current_frame[1])
-    omitted = len(problems) - MAX_TOLD
-    message = " ".join(problems[:MAX_TOLD]) + (f" And {omitted} more." if omitted > 0 else "")
+    omitted = len(problems) - MAX_LISTED
+    message = " ".join(problems[:MAX_LISTED]) + (f" And {omitted} more." if omitted > 0 else "")
     if not views:
         raise BadInputError(f"None of the pictures can be used: {message}")
     metre = scene.unit_settings.scale_length if scene.unit_settings.system != "NONE" else 1.0
@@ -152,7 +152,7 @@ def _write(
         frame = {"file_path": file_path, "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy}
         frame |= {"cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
         if camera.lens is not None:
-            frame[OWN_LENS] = told_lens(camera.lens)
+            frame[OWN_LENS] = lens_to_json(camera.lens)
         frames.append(frame | view.properties)
     _write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     entries = [

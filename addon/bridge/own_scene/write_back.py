@@ -17,11 +17,11 @@ from ...core.brdf.material import ObjectMaterial, undescribed
 from ...core.errors import BadInputError, MissingStageError
 from ...core.results.room_file import run_of
 from ...core.scene.model import Capture
+from ..custom_properties import OBJECT_ID, RESULT, RUN, set_run
 from ..data.arrays import faces_of, read, set_layer, vertices_of
 from ..data.materials import MODEL, make_material
 from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
-from ..marks import OBJECT_ID, RESULT, RUN, mark
 from ..refused import sentences
 from ..results import images
 from .capture import Source, check_own, polygons_of, sources
@@ -158,7 +158,7 @@ class _Assignment:
         for slot in obj.material_slots:
             slot.material = material
         obj[OBJECT_ID] = source.object_id
-        mark(obj, self.folder, self.run)
+        set_run(obj, self.folder, self.run)
         remove_unused_materials(old_materials)
 
     def copy(self, generated: list[tuple]) -> list[str]:

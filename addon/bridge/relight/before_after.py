@@ -15,7 +15,7 @@ from ...core.atomic import TEMPORARY
 from ...core.errors import BadInputError
 from ...core.io.folder import MATERIALS, SCENE
 from ...core.progress import Progress
-from ..marks import RESULT
+from ..custom_properties import RESULT
 from ..refused import refused
 from .pictures import check_format, render_to_file, save_side_by_side, seconds_expected, timed_progress
 from .setup import captured_light

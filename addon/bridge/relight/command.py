@@ -138,7 +138,7 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
     if light.lamps is not None:
         set_lamps(scene, light.lamps)
     if light.hdri is not None:
-        outside.use_hdri(scene, light.hdri, outside.usual_radiance(scene))
+        outside.use_hdri(scene, light.hdri, outside.outdoor_radiance(scene))
     if scene.world is not None and light.world is not None:
         if light.world not in ("on", "off"):
             message = f"Option --world takes on, off or an angle in degrees, not '{light.world}'."

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.scene.sphere import fibonacci
 from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
@@ -94,8 +94,8 @@ def measure_in_steps(scene: bpy.types.Scene) -> Iterator[None]:
                 direct.append(_irradiance(scene, source, point, normal))
                 yield
             indirect = _mean_irradiance(scene, key, cache.areas, direct[cache.visible_count :])
-            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect * USUAL_ALBEDO / (
-                1 - USUAL_ALBEDO
+            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect * TYPICAL_ALBEDO / (
+                1 - TYPICAL_ALBEDO
             )
     cache.irradiances = irradiances
     _caches[scene.name] = cache
@@ -120,16 +120,16 @@ def _rounded_pose(obj) -> tuple:
 def _sample_points(scene) -> tuple[list, int, np.ndarray]:
     """Points, visible count and areas of a `ViewCache`; no point is on a lamp."""
     rays = [picture_ray(scene, *place) for place in PICTURE]
-    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
+    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.obj)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):
         for direction in map(Vector, fibonacci(_ROOM_RAYS)):
             hit = cast(scene, start, direction)
-            if hit is not None and not _is_lamp(hit.thing):
+            if hit is not None and not _is_lamp(hit.obj):
                 hits.append(hit)
                 areas.append(hit.distance**2 / max(-hit.normal.dot(direction), 0.2))
     return (
-        [(hit.place + 1e-3 * hit.normal, hit.normal) for hit in hits],
+        [(hit.location + 1e-3 * hit.normal, hit.normal) for hit in hits],
         visible_count,
         np.array(areas) * 2 * math.pi / _ROOM_RAYS,
     )

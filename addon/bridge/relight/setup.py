@@ -120,7 +120,7 @@ def _apply_picture(scene, picture: str | None) -> list[str]:
     if not picture:
         return []
     try:
-        relight_outside.use_hdri(scene, picture, relight_outside.usual_radiance(scene))
+        relight_outside.use_hdri(scene, picture, relight_outside.outdoor_radiance(scene))
     except BadInputError:
         return [f"The picture around the room, '{picture}', is gone; the recovered outside shines instead."]
     return relight_outside.remarks(scene)

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ..custom_properties import OBJECT_ID
 from ..light.room import (
     CURSOR,
     OBJECT,
@@ -19,7 +20,6 @@ from ..light.room import (
     target_of,
     view_direction,
 )
-from ..marks import OBJECT_ID
 
 _OBJECT_SHARE = 0.05
 """Weighted share of the picture from which on a single object is its subject."""
@@ -59,23 +59,23 @@ def subject_of(scene: bpy.types.Scene, aim: str, obj: bpy.types.Object | None = 
     if not hits or aim in (CURSOR, OBJECT):
         target = target_of(scene, aim, obj)
         name, radius = (obj.name, max(obj.dimensions) / 2) if aim == OBJECT else ("", 0.5)
-        counts = [5.0 if (hit.place - target).length < max(radius, 0.5) else 1.0 for hit in hits]
+        counts = [5.0 if (hit.location - target).length < max(radius, 0.5) else 1.0 for hit in hits]
     else:
         shell, shares = _shell(scene), {"": _OBJECT_SHARE * sum(hits.values())}
         for hit, weight in hits.items():
-            if hit.thing.name not in shell:
-                shares[hit.thing.name] = shares.get(hit.thing.name, 0.0) + weight
+            if hit.obj.name not in shell:
+                shares[hit.obj.name] = shares.get(hit.obj.name, 0.0) + weight
         name = max(shares, key=shares.get)
         # A ceiling is seldom the subject of a picture.
-        counts = [4.0 if hit.thing.name == name else 0.25 if hit.normal.z < -0.7 else 1.0 for hit in hits]
-        counted = {hit: count for hit, count in zip(hits, counts) if not name or hit.thing.name == name}
-        positions = np.array([hit.place for hit in counted])
+        counts = [4.0 if hit.obj.name == name else 0.25 if hit.normal.z < -0.7 else 1.0 for hit in hits]
+        counted = {hit: count for hit, count in zip(hits, counts) if not name or hit.obj.name == name}
+        positions = np.array([hit.location for hit in counted])
         center = np.average(positions, axis=0, weights=[count * hits[hit] for hit, count in counted.items()])
         distances = np.linalg.norm(positions - center, axis=1)
         target, radius = Vector(positions[distances.argmin()]), float(np.quantile(distances, 0.8))
     if not hits:
         return Subject(target, name, np.array([target]), np.array([(0.0, 0.0, 1.0)]), np.ones(1), radius)
-    points, normals = (np.array([getattr(hit, field) for hit in hits]) for field in ("place", "normal"))
+    points, normals = (np.array([getattr(hit, field) for hit in hits]) for field in ("location", "normal"))
     weights = np.array(counts) * list(hits.values())
     return Subject(target, name, points, normals, weights / weights.sum(), min(max(radius, 0.2), 1.5))
 
@@ -85,8 +85,8 @@ def _visible_hits(scene) -> dict[Hit, float]:
     weights: dict[Hit, float] = {}
     for x, y in PICTURE if scene.camera is not None else ():
         hit = cast(scene, *picture_ray(scene, x, y))
-        if hit is not None and OBJECT_ID in hit.thing:
-            weights[hit._replace(place=hit.place.freeze(), normal=hit.normal.freeze())] = math.exp(
+        if hit is not None and OBJECT_ID in hit.obj:
+            weights[hit._replace(location=hit.location.freeze(), normal=hit.normal.freeze())] = math.exp(
                 -((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3**2)
             )
     return weights

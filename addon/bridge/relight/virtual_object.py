@@ -76,7 +76,7 @@ def add_virtual(
     if shape == MONKEY:
         obj.modifiers.new("Smooth", "SUBSURF").render_levels = 2
         if scene.camera:
-            to_camera = scene.camera.matrix_world.translation - surface.place
+            to_camera = scene.camera.matrix_world.translation - surface.location
             obj.rotation_euler.z = math.atan2(to_camera.y, to_camera.x) + math.pi / 2
     stand(scene, obj, surface)
     return obj
@@ -116,12 +116,12 @@ def stand(scene: bpy.types.Scene, obj: bpy.types.Object, surface: Hit | None = N
         low, high = corners.min(0), corners.max(0)
         pivot = Vector((*((low + high) / 2)[:2], low[2]))
         radius = float(np.linalg.norm(corners[:, :2] - np.array(pivot[:2]), axis=1).max())
-        place = surface.place
+        place = surface.location
         if surface.normal.z < _MIN_NORMAL_Z:
             below = cast(scene, place + surface.normal * (radius + 0.01), _DOWN)
             if below is None:
                 raise BadInputError("There is no surface below that place to stand on; choose a floor or a table top.")
-            place = below.place
+            place = below.location
         place = _clear_of_walls(scene, place, radius, float(high[2] - low[2]))
         shift = place - pivot
         shift.z -= _drop(scene, corners + np.array(shift), place.z)
@@ -154,7 +154,7 @@ def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = Non
                 return hit_in_view
             origin, direction = picture_ray(scene)
             if hit := cast(scene, origin, direction):
-                starts.insert(0, hit.place - direction * min(0.8, 0.4 * hit.distance))
+                starts.insert(0, hit.location - direction * min(0.8, 0.4 * hit.distance))
         for start in starts:
             inside = all(low[k] <= start[k] <= high[k] + 0.05 for k in range(3))
             hit = cast(scene, start, _DOWN) if inside else None
@@ -172,12 +172,12 @@ def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
         if hit is None or hit.normal.z < 0.95:
             continue
         around = [
-            cast(scene, hit.place + Vector((dx, dy, 0.05)), _DOWN, 0.1)
+            cast(scene, hit.location + Vector((dx, dy, 0.05)), _DOWN, 0.1)
             for dx, dy in ((_FLAT_RADIUS, 0), (-_FLAT_RADIUS, 0), (0, _FLAT_RADIUS), (0, -_FLAT_RADIUS))
         ]
-        if not all(neighbour and abs(neighbour.place.z - hit.place.z) < 0.02 for neighbour in around):
+        if not all(neighbour and abs(neighbour.location.z - hit.location.z) < 0.02 for neighbour in around):
             continue
-        above = [hit.place + Vector((dx, dy, 0.2)) for dx, dy in ((0, 0), (_FLAT_RADIUS, 0), (-_FLAT_RADIUS, 0))]
+        above = [hit.location + Vector((dx, dy, 0.2)) for dx, dy in ((0, 0), (_FLAT_RADIUS, 0), (-_FLAT_RADIUS, 0))]
         if not any(cast(scene, place, origin - place, (origin - place).length) for place in above):
             return hit  # and an object there is visible
     return None
@@ -218,5 +218,5 @@ def _drop(scene, points: np.ndarray, height: float) -> float:
         # From the height of the object's middle: what is above it, as a table top above the floor, is not below it.
         hit = cast(scene, Vector((x, y, min(z, height) + lift)), _DOWN)
         if hit:
-            gaps.append(z - hit.place.z)
+            gaps.append(z - hit.location.z)
     return min(gaps, default=0.0)

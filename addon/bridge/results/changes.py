@@ -10,7 +10,7 @@ import bpy
 from ...core.brdf.material import renamed
 from ...core.kinds import Shown
 from ...core.results.room_file import DAMAGE, MATERIALS
-from ..marks import CHANGES, LAST_FOUND
+from ..custom_properties import CHANGES, LAST_FOUND
 
 ROUGHNESS: Shown[float] = 0.1
 ALBEDO: Shown[float] = 0.05

@@ -13,8 +13,8 @@ import bpy
 from ...core.brdf.material import renamed
 from ...core.io.files import json_if_sound
 from ...core.io.folder import MATERIALS, REPORT
+from ..custom_properties import OBJECT_ID, RESULT, RUN
 from ..data.materials import MODEL
-from ..marks import OBJECT_ID, RESULT, RUN
 
 FITS, EARLIER, UNKNOWN, GONE = "FITS", "EARLIER", "UNTOLD", "GONE"
 """State of an object relative to its result: it is of the run in the folder; of another one; unknown, as the object or

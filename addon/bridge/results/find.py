@@ -14,12 +14,12 @@ import bpy
 
 from ...core.errors import BadInputError
 from ...core.kinds import Limit, Shown
-from ...core.results.place import BESIDE
+from ...core.results.result_folders import FOLDER_BESIDE
 from ...core.results.room_file import MATERIALS, layout_of, run_of
+from ..custom_properties import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from ..data.images import relative_to, result_of
-from ..marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from . import file
-from .home import display_path
+from .default_folders import display_path
 from .images import KEPT, is_there, kept_path, path_of, result_images
 
 MAX_NAMED: Shown[int] = 3
@@ -142,7 +142,7 @@ def missing() -> list[Missing]:
     return results
 
 
-def search(home: Path) -> list[str]:
+def search(results_root: Path) -> list[str]:
     """Search likely folders for missing results and redirect the open file; a sentence on each one found."""
     messages = []
     for image in _outdated_images():
@@ -162,8 +162,8 @@ def search(home: Path) -> list[str]:
         file_folders = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
         candidates = [
             *file_folders,
-            *(folder / part / lost.folder.name for folder in file_folders for part in ("", BESIDE)),
-            home / lost.folder.name,
+            *(folder / part / lost.folder.name for folder in file_folders for part in ("", FOLDER_BESIDE)),
+            results_root / lost.folder.name,
         ]
         new = next(
             (place for place in candidates if lost.run and run_of(place) == lost.run or _keeps_images(place, lost)),

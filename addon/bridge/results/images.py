@@ -13,8 +13,8 @@ from ...core.atomic import replacing
 from ...core.errors import BadInputError, StorageError
 from ...core.io.folder import capture_name
 from ...core.results.room_file import layout_of
+from ..custom_properties import IMAGE, LAYOUT
 from ..data.images import DATA, RADIANCE, image_name, load_image, relative_to, result_of, tiles_of
-from ..marks import IMAGE, LAYOUT
 from ..refused import refused
 from ..scene.write import ALBEDO, BASE_COLOR, SCENE_FILES, SHADING
 

@@ -14,11 +14,11 @@ import bpy
 
 from ...core.errors import BadInputError
 from ...core.kinds import Shown
+from ..custom_properties import OBJECT_ID, RESULT
 from ..data.images import RADIANCE
 from ..data.materials import texture
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import add_node, fresh_tree, mix_node
-from ..marks import OBJECT_ID, RESULT
 from .file import FITS, result_states
 from .images import image
 

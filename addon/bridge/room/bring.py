@@ -13,9 +13,9 @@ import bpy
 from ...core.errors import BadInputError, MissingStageError
 from ...core.io.folder import SCENE
 from ...core.results.room_file import ROOM, root_of, run_of
+from ..custom_properties import IMAGE, OWN_SCENE, RESULT, UV_MAP, set_run
 from ..data.added import AddedData
 from ..data.cameras import show_camera
-from ..marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
 from ..results import changes as room_changes
 from ..results import images
 from ..scene.as_made import stamp, stamp_tree
@@ -86,7 +86,7 @@ def bringing(
         run = run_of(folder)
         objects = list(fresh.all_objects)
         for owner in (fresh, *objects):
-            mark(owner, folder, run, root)
+            set_run(owner, folder, run, root)
         for done, obj in enumerate(objects, 1):  # a scene.blend of an older version has no stamps
             stamp(obj)
             if not done % 16:

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 
 from ...core.scene.model import Capture
+from ..custom_properties import CAPTURE, OWN_SCENE
 from ..data.added import AddedData
 from ..data.cameras import make_cameras, make_track, use_camera
 from ..data.mesh_objects import each_object
-from ..marks import CAPTURE, OWN_SCENE
 from ..relight.match_frame import show_picture
 from ..scene.as_made import stamp
 from ..scene.parts import CAMERAS, ROOM, find_room, new_room, part_of, scene_name, scenes_with

@@ -10,11 +10,11 @@ import numpy as np
 from mathutils import Matrix
 
 from ..corrections import corrections
+from ..custom_properties import CAPTURE, OBJECT_ID, RESULT, RUN
 from ..data.arrays import faces_of, layer_of, read, set_layer, vertices_of
 from ..data.cameras import FRAME_INDEX, NO_FRAME
 from ..data.mesh_objects import ATLAS_UV
 from ..light import lamps as relight_lamps
-from ..marks import CAPTURE, OBJECT_ID, RESULT, RUN
 from ..own_scene.mesh import same_topology
 from ..refused import sentences
 from ..scene.as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours, is_renamed, made_at

@@ -5,8 +5,8 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import MissingStageError
+from ..custom_properties import CAPTURE, OWN_SCENE
 from ..light import outside
-from ..marks import CAPTURE, OWN_SCENE
 from ..render_device import preferences_of_cycles
 from .as_made import WRITTEN, is_corrected
 

@@ -18,6 +18,7 @@ from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import openings_of, run_of
 from ...core.scene.model import Capture
+from ..custom_properties import OWN_SCENE, set_run
 from ..data.added import scene_apart
 from ..data.arrays import make_mesh
 from ..data.cameras import best_view, lens_warning, make_cameras, make_track, make_view, size_warning, use_camera
@@ -25,7 +26,6 @@ from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import let_light_through, make_material
 from ..data.mesh_objects import each_object, is_open
 from ..data.nodes import make_world
-from ..marks import OWN_SCENE, mark
 from ..refused import refused
 from .as_made import stamp, stamp_tree
 from .parts import CAMERAS, EXPOSURE, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
@@ -61,7 +61,7 @@ def _build(
     objects = dict(each_object(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv))
     run = run_of(folder)
     for owner in (top, *objects.values()):
-        mark(owner, folder, run, capture.root)
+        set_run(owner, folder, run, capture.root)
     descriptions = {m.object_id: m for m in materials}
     own_images = load_parts(folder, parts.images, capture.root.name, descriptions) if parts else {}
     for instance in capture.instances:
@@ -89,7 +89,7 @@ def _build(
     scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
     scene[EXPOSURE] = scene.view_settings.exposure
     for obj in (*panels, *cameras, *filter(None, (track,))):
-        mark(obj, folder, run, capture.root)
+        set_run(obj, folder, run, capture.root)
         stamp(obj)
     hide_cameras(scene, top)
     warnings = tuple(filter(None, (size_warning(capture.frames), lens_warning(capture.frames))))

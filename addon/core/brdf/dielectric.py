@@ -8,15 +8,15 @@ from .compensation import base_color, ior_of
 from .ggx import GGX
 from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled, Prior, roughness
 
-LEAST_F0 = 0.02
+MIN_F0 = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted F0 is no lobe at all."""
-USUAL_F0 = 0.04
+TYPICAL_F0 = 0.04
 """What a dielectric of one colour reflects at normal incidence (n = 1.5)."""
-MOST_F0 = 0.12
+MAX_F0 = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 SATIN = 0.5
 """Roughness of what no frame shows well enough: most paints, woods and plastics lie around it."""
-PRIOR = Prior(USUAL_F0, 0.01)
+PRIOR = Prior(TYPICAL_F0, 0.01)
 """Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
 much stronger for nearly the same frames (living room's panels: alpha 0.39 with F0 0.05 or 0.45 with 0.1): there this
 decides; where the frames show it, they outweigh it."""
@@ -29,11 +29,11 @@ class Dielectric(Brdf):
     icon: str = "SHADING_TEXTURE"
     microfacets: Microfacets | None = GGX
     parameters: tuple[str, ...] = ("roughness", "f0", "base_color")
-    constraints: Constraints = Constraints(least_psi=LEAST_F0, prior=PRIOR)
+    constraints: Constraints = Constraints(least_psi=MIN_F0, prior=PRIOR)
 
     def plausible_f0(self, base_color=None) -> F0:
         """Of an index of refraction of 1.5, whatever the colour."""
-        return USUAL_F0
+        return TYPICAL_F0
 
     def base_color(self, albedo: np.ndarray, of: Parameters) -> np.ndarray:
         """More than the albedo by what Principled's specular layer takes from its diffuse part."""

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from .lambertian import USUAL_ALBEDO
+from .lambertian import TYPICAL_ALBEDO
 from .model import Brdf, Parameters, Principled
 
-LAMP_ALBEDO = USUAL_ALBEDO
+LAMP_ALBEDO = TYPICAL_ALBEDO
 """What a lamp reflects can't be measured under its own light. Shades and diffusers are white to grey: switched off,
 a lamp of which nothing else is known (`passes.unlit_lamps`) shows this grey. Black, it is a hole in the room (living
 room, lamps off: 1 % of the pixels, half of the error)."""

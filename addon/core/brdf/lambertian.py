@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from .model import Brdf
 
-USUAL_ALBEDO = 0.5
+TYPICAL_ALBEDO = 0.5
 """Of a room's surfaces, on average: what is taken where nothing is known."""
 
 

@@ -8,7 +8,7 @@ from ..luminance import rgb
 from .ggx import GGX
 from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled, roughness
 
-USUAL_F0 = 0.6
+TYPICAL_F0 = 0.6
 """What common metals reflect at normal incidence."""
 
 
@@ -28,7 +28,7 @@ class Metal(Brdf):
 
     def plausible_f0(self, base_color=None) -> F0:
         """The colour it is known by."""
-        return tuple(base_color) if base_color else (USUAL_F0,) * 3
+        return tuple(base_color) if base_color else (TYPICAL_F0,) * 3
 
     def base_color(self, albedo: np.ndarray, of: Parameters) -> np.ndarray:
         """F0."""

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from ..errors import BadInputError
-from ..origin import of_point, of_thing
+from ..origin import package_of, package_of_entry_point
 from .dielectric import DIELECTRIC
 from .emitter import EMITTER
 from .lambertian import LAMBERTIAN
@@ -48,11 +48,11 @@ def find(name: str | None) -> Brdf | None:
 
 def origin(model: Brdf) -> str:
     """The package that a model comes from, and its version; "" for the program's own."""
-    return _packages.get(model.name) or " ".join(filter(None, map(of_thing, (model, model.microfacets))))
+    return _packages.get(model.name) or " ".join(filter(None, map(package_of, (model, model.microfacets))))
 
 
-def shown(name: str | None) -> Brdf:
-    """The model of a name as interfaces show it: `LAMBERTIAN` where its package is not there."""
+def find_or_lambertian(name: str | None) -> Brdf:
+    """The model of a name, for display: `LAMBERTIAN` where its package is not installed."""
     return find(name) or LAMBERTIAN
 
 
@@ -70,6 +70,6 @@ def _installed() -> None:
     """Register, once, what installed packages bring; one that is broken is left out with a warning."""
     for entry in entry_points(group=GROUP):
         try:
-            _packages[register(entry.load()).name] = of_point(entry)
+            _packages[register(entry.load()).name] = package_of_entry_point(entry)
         except Exception as error:  # whatever another package does wrong
             warnings.warn(f"The reflectance model '{entry.name}' can't be loaded ({error!r}); mend it.", stacklevel=2)

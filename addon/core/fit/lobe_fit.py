@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..brdf.dielectric import USUAL_F0
+from ..brdf.dielectric import TYPICAL_F0
 from ..brdf.model import Constraints
 from ..significance import LEVELS, SIGMA_OF_MAD
 from .params import LOBE_FIT
@@ -107,7 +107,7 @@ def solve(
             return dense.own_spread(lobe, values, scale)
         return np.broadcast_to(np.float32(1) if dense.spread is None else dense.spread, shape)
 
-    spread = spread_with(np.full((3, 1), USUAL_F0) if fixed is None else fixed)
+    spread = spread_with(np.full((3, 1), TYPICAL_F0) if fixed is None else fixed)
     weight = dense.there / np.square(spread)
     for _ in range(1 if lobe is None or fixed is not None else LOBE_FIT.rounds):
         weighted_t = weight * t

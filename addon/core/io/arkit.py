@@ -19,7 +19,7 @@ from .meshes import read_mesh
 
 TURNED = (".gltf", ".glb")
 """Meshes that come turned to +Z up from their reader."""
-MOST = 300
+MAX_FRAMES = 300
 """Frames that are taken of a recording, evenly: 60 a second show nearly the same. nerfstudio's default."""
 FUSE = (
     "stores depth alone: fuse it to a mesh in the recording's coordinates, put it there as 'mesh.ply', or name it with "

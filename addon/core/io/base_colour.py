@@ -111,7 +111,7 @@ def _of_obj(path: Path) -> list[StoredPicture | None]:
     for library in dict.fromkeys(libraries):
         name = b""
         file_of = beside(path, library.decode("utf-8", "replace"), "material library")
-        for line in read_bytes(file_of, most=MAX_MTL).splitlines():
+        for line in read_bytes(file_of, max_bytes=MAX_MTL).splitlines():
             if match := NEW.match(line):
                 name = match[1]
             elif name in used and (match := PICTURE.match(line)):

@@ -1,4 +1,4 @@
-"""Whether a camera's numbers can be those of one: a slip of the decimal point would overflow far from its cause."""
+"""Plausibility checks of camera parameters: a misplaced decimal point would cause an overflow much later."""
 
 import dataclasses
 import math
@@ -15,11 +15,11 @@ from ..scene.model import Camera, Frame
 
 FOCAL: Limit[tuple[float, float]] = (1e-3, 1e6)
 """Bounds of a focal length over the frame's longer side; a panorama has 0.16."""
-LEAST: Limit[int] = 2
+MIN_SIZE: Limit[int] = 2
 """Pixels of a frame's shorter side: edges are differences of two."""
-OFF: Limit[int] = 100
+MAX_OFFSET: Limit[int] = 100
 """How many of the frame's sides the principal point may lie from its corner."""
-STRONGEST: Limit[float] = 1e9
+MAX_COEFFICIENT: Limit[float] = 1e9
 """Bound of a lens's coefficients; those of a telephoto lens's high powers are large."""
 
 
@@ -50,7 +50,7 @@ def check_camera(camera: Camera, name: str) -> None:
         One is not finite or beyond what any camera has.
     """
     side = max(camera.width, camera.height)
-    if min(camera.width, camera.height) < LEAST:
+    if min(camera.width, camera.height) < MIN_SIZE:
         raise BadInputError(
             f"Frame '{name}' has {camera.width} x {camera.height} pixels, too few to show anything; give larger ones."
         )
@@ -61,20 +61,20 @@ def check_camera(camera: Camera, name: str) -> None:
                 "the camera's angle."
             )
     for key, value, extent in (("cx", camera.cx, camera.width), ("cy", camera.cy, camera.height)):
-        if not abs(value) <= OFF * extent:
+        if not abs(value) <= MAX_OFFSET * extent:
             raise BadInputError(f"Frame '{name}' has a principal point with {key} = {value:.4g}; give pixels.")
     for value in _numbers(camera.lens):
-        if not abs(value) <= STRONGEST:
+        if not abs(value) <= MAX_COEFFICIENT:
             raise BadInputError(f"Frame '{name}' has a lens with the coefficient {value:.4g}; check its distortion.")
 
 
 def check_size(frame: Frame, path: Path, size: tuple[int, int]) -> None:
     """Raise `BadInputError` where a picture's width and height are not those of the frame's camera."""
-    wanted = frame.camera.width, frame.camera.height
-    if size != wanted:
+    camera_size = frame.camera.width, frame.camera.height
+    if size != camera_size:
         raise BadInputError(
             f"Frame '{frame.name}': '{path}' has {size[0]} x {size[1]} pixels, but its camera has "
-            f"{wanted[0]} x {wanted[1]}; give them one size."
+            f"{camera_size[0]} x {camera_size[1]}; give them one size."
         )
 
 

@@ -21,7 +21,7 @@ from .exr import HALF_MAX
 
 LOOK = 32
 """Frames that are looked at, spread evenly; 0.4 s for 320 x 240."""
-MOST: Block[int] = 1 << 23
+MAX_PIXELS: Block[int] = 1 << 23
 """Pixels of a picture of which all are looked at; of more, every second, third and so on."""
 WIDTH = 1e-3
 """Values within this share of the greatest are alike: a half float rounds by up to 5e-4."""
@@ -94,7 +94,9 @@ def find_clipping(frames: Sequence[Frame], read: Callable[[Path], np.ndarray]) -
         values = values[(np.isfinite(values) & (values < HALF_MAX)).all(1)]
         top.append(values.max(initial=0))
         # Only what lies at a level or just below is counted, and no level is below a picture's greatest value.
-        pictures.append(values[values.max(1, initial=0) >= top[-1] * (1 - 11 * WIDTH)][:: len(values) // MOST + 1])
+        pictures.append(
+            values[values.max(1, initial=0) >= top[-1] * (1 - 11 * WIDTH)][:: len(values) // MAX_PIXELS + 1]
+        )
         exposures.append(frames[i].exposure)
     exposure = np.array(exposures)
     if not sum(len(values) for values in pictures):

@@ -15,9 +15,9 @@ from ..errors import BadInputError
 from ..kinds import Code, Limit
 from ..scene.lenses_colmap import COUNTS, NAMES
 
-LONGEST_NAME: Limit[int] = 4096
-LEAST_CAMERA: Code[int] = 24 + 2 * 8
-LEAST_IMAGE: Code[int] = 64 + 1 + 8
+MAX_NAME_BYTES: Limit[int] = 4096
+MIN_CAMERA_BYTES: Code[int] = 24 + 2 * 8
+MIN_IMAGE_BYTES: Code[int] = 64 + 1 + 8
 """Bytes of the smallest records: counts that the file is too short for are told before anything is made of them."""
 
 
@@ -164,11 +164,11 @@ def _mapped(path: Path) -> Iterator[mmap.mmap]:
         yield data
 
 
-def _count(data: mmap.mmap, least: int, what: str, path: Path) -> int:
+def _count(data: mmap.mmap, record_bytes: int, records: str, path: Path) -> int:
     count = struct.unpack_from("<Q", data)[0]
-    if count > (len(data) - 8) // least:
+    if count > (len(data) - 8) // record_bytes:
         raise BadInputError(
-            f"'{path}' claims {count} {what}, more than its {len(data)} bytes can hold; export the model again."
+            f"'{path}' claims {count} {records}, more than its {len(data)} bytes can hold; export the model again."
         )
     return count
 
@@ -180,37 +180,37 @@ def _cut_off(path: Path, what: str, index: int) -> BadInputError:
 def _binary_cameras(path: Path) -> dict[int, ColmapCamera]:
     cameras = {}
     with _mapped(path) as data:
-        at = 8
-        for index in range(_count(data, LEAST_CAMERA, "cameras", path)):
+        offset = 8
+        for index in range(_count(data, MIN_CAMERA_BYTES, "cameras", path)):
             try:
-                number, model, width, height = struct.unpack_from("<IiQQ", data, at)
+                number, model, width, height = struct.unpack_from("<IiQQ", data, offset)
                 if model not in NAMES:
                     raise BadInputError(
                         f"'{path}' has camera {number} of model number {model}, which is none of "
                         "COLMAP's that are known; undistort the pictures with COLMAP."
                     )
-                parameters = struct.unpack_from(f"<{COUNTS[NAMES[model]]}d", data, at + 24)
+                parameters = struct.unpack_from(f"<{COUNTS[NAMES[model]]}d", data, offset + 24)
             except struct.error:
                 raise _cut_off(path, "camera", index) from None
             cameras[number] = ColmapCamera(NAMES[model], width, height, parameters)
-            at += 24 + 8 * len(parameters)
+            offset += 24 + 8 * len(parameters)
     return cameras
 
 
 def _binary_images(path: Path) -> list[ColmapImage]:
     images = []
     with _mapped(path) as data:
-        at = 8
-        for index in range(_count(data, LEAST_IMAGE, "images", path)):
+        offset = 8
+        for index in range(_count(data, MIN_IMAGE_BYTES, "images", path)):
             try:
-                number, *pose, camera = struct.unpack_from("<I7dI", data, at)
-                end = data.find(b"\0", at + 64, at + 64 + LONGEST_NAME)
+                number, *pose, camera = struct.unpack_from("<I7dI", data, offset)
+                end = data.find(b"\0", offset + 64, offset + 64 + MAX_NAME_BYTES)
                 points = 0 if end < 0 else struct.unpack_from("<Q", data, end + 1)[0]
             except struct.error:
                 raise _cut_off(path, "image", index) from None
             if end < 0 or end + 9 + 24 * points > len(data):
                 raise _cut_off(path, "image", index)
-            name = _name(data[at + 64 : end])
+            name = _name(data[offset + 64 : end])
             images.append(ColmapImage(number, tuple(pose[:4]), tuple(pose[4:]), camera, name))
-            at = end + 9 + 24 * points
+            offset = end + 9 + 24 * points
     return images

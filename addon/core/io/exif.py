@@ -1,4 +1,4 @@
-"""EXIF of JPEG and TIFF, which is a TIFF within a JPEG: how long and how wide a camera was open.
+"""EXIF of JPEG and TIFF, which is a TIFF within a JPEG: exposure time, f-number, ISO and orientation.
 
 OpenImageIO 3.0 leaves out the ISO of TIFF's EXIF, and frames of unlike ISO would come out as unlike light.
 Source: TIFF 6.0, section 2; CIPA DC-008 (Exif 2.32), 4.6.5.
@@ -19,7 +19,7 @@ F_NUMBER: Code[int] = 0x829D
 ISO: Code[int] = 0x8827
 ORDERS = {b"II*\0": "<", b"MM\0*": ">"}
 JPEG_MAGIC = b"\xff\xd8\xff"
-HEAD: Limit[int] = 1 << 20
+HEAD_BYTES: Limit[int] = 1 << 20
 """Bytes in which a JPEG's EXIF has to end; with a thumbnail it has some 64 thousand."""
 MAX_TAGS: Limit[int] = 4096
 TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: ("d", 8)}
@@ -50,20 +50,20 @@ def read_tags(data: bytes, pointer: int | None = None, order: str = "", base: in
         (count,) = struct.unpack_from(order + "H", data, pointer - base)
         tags: dict[int, float] = {}
         for i in range(min(count, MAX_TAGS)):
-            at = pointer - base + 2 + 12 * i
-            tag, kind, number = struct.unpack_from(order + "HHI", data, at)
-            if kind not in TYPES or not number:
+            offset = pointer - base + 2 + 12 * i
+            tag, value_type, value_count = struct.unpack_from(order + "HHI", data, offset)
+            if value_type not in TYPES or not value_count:
                 continue
-            code, size = TYPES[kind]
-            if number * size > 4:
-                (at,) = struct.unpack_from(order + "I", data, at + 8)
-                at -= base
+            code, size = TYPES[value_type]
+            if value_count * size > 4:
+                (offset,) = struct.unpack_from(order + "I", data, offset + 8)
+                offset -= base
             else:
-                at += 8
-            if at < 0 or at + size > len(data):
+                offset += 8
+            if offset < 0 or offset + size > len(data):
                 continue  # beyond what was read of the file, as large tables are
-            value = struct.unpack_from(order + code, data, at)
-            if kind != 5:
+            value = struct.unpack_from(order + code, data, offset)
+            if value_type != 5:
                 tags.setdefault(tag, value[0])
             elif value[1]:
                 tags.setdefault(tag, value[0] / value[1])
@@ -87,23 +87,23 @@ def exposure_tags(data: bytes, pointer: int | None = None, order: str = "", base
 
 
 def exif_exposure(path: Path) -> dict[int, float]:
-    """Exposure time in seconds, f-number and ISO of the JPEG, TIFF, DNG or HEIC `path`, by tag, as far as it tells."""
-    data = read_bytes(path, "Picture ", HEAD)
+    """Exposure time in seconds, f-number and ISO of the JPEG, TIFF, DNG or HEIC `path`, by tag, as far as stated."""
+    data = read_bytes(path, "Picture ", HEAD_BYTES)
     if is_heif(data):
         return exposure_tags(heif_exif(path))
     if not data.startswith(JPEG_MAGIC):
         try:
             return exposure_tags(*_directory(data, path))
-        except (struct.error, KeyError):  # damaged, as its size will tell
+        except (struct.error, KeyError):  # damaged: reported when its size is read
             return {}
-    at = data.find(b"Exif\0\0")
-    return exposure_tags(data[at + 6 :]) if at >= 0 else {}
+    offset = data.find(b"Exif\0\0")
+    return exposure_tags(data[offset + 6 :]) if offset >= 0 else {}
 
 
 def exif_orientation(path: Path) -> int:
-    """How the camera was held that took the TIFF or DNG `path`, EXIF's number; 1 where it does not tell."""
+    """EXIF's orientation of the TIFF or DNG `path`; 1 where it is not stated."""
     try:
-        return int(read_tags(*_directory(read_bytes(path, "Picture ", HEAD), path)).get(ORIENTATION, 1))
+        return int(read_tags(*_directory(read_bytes(path, "Picture ", HEAD_BYTES), path)).get(ORIENTATION, 1))
     except (struct.error, KeyError, ValueError, OverflowError):
         return 1
 
@@ -113,9 +113,9 @@ def _directory(data: bytes, path: Path) -> tuple[bytes, int, str, int]:
     order = ORDERS[data[:4]]
     (pointer,) = struct.unpack_from(order + "I", data, 4)
     base = 0
-    if pointer + HEAD // 2 > len(data) >= HEAD:
-        base = max(pointer - HEAD // 2, 0)
+    if pointer + HEAD_BYTES // 2 > len(data) >= HEAD_BYTES:
+        base = max(pointer - HEAD_BYTES // 2, 0)
         with open(path, "rb") as file:  # the directory often follows the pixels
             file.seek(base)
-            data = file.read(HEAD)
+            data = file.read(HEAD_BYTES)
     return data, pointer, order, base

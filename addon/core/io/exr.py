@@ -25,12 +25,12 @@ def read_header(path: Path) -> tuple[int, int]:
     BadInputError
         As `read_exr`, but for damage within the compressed pixels.
     """
-    return _supported(path)[0].header.size
+    return _layer_to_read(path)[0].header.size
 
 
 def exr_note(path: Path) -> str:
     """Which layer or view `read_exr` takes, to end a sentence; '' where there is no other. Raises as `read_header`."""
-    return _supported(path)[1]
+    return _layer_to_read(path)[1]
 
 
 def read_exr(path: Path) -> Picture:
@@ -44,7 +44,7 @@ def read_exr(path: Path) -> Picture:
     BadInputError
         The file is absent, damaged, cut off, or of a kind that isn't supported.
     """
-    layer, _ = _supported(path)
+    layer, _ = _layer_to_read(path)
     header = layer.header
     names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
     planes = _planes(path, layer.part, names)
@@ -53,8 +53,8 @@ def read_exr(path: Path) -> Picture:
     del plane
     width, height = window_size(header.data_window)
     for name, plane in zip(names, planes):
-        across, down = header.channels[name]
-        if plane.shape != (-(-height // down), -(-width // across)):
+        x_sampling, y_sampling = header.channels[name]
+        if plane.shape != (-(-height // y_sampling), -(-width // x_sampling)):
             raise BadInputError(f"Picture '{path}' is damaged (its channels differ in size); write or copy it again.")
     alpha = planes.pop() if layer.alpha else None
     chromaticities = header.chromaticities or REC709
@@ -83,7 +83,7 @@ def read_numbers(path: Path) -> np.ndarray:
     if len(headers) == 1 and list(headers[0].channels.values()) == [(1, 1)]:  # one channel of any name
         header, part, names = headers[0], 0, tuple(headers[0].channels)
     else:
-        layer, _ = _supported(path)
+        layer, _ = _layer_to_read(path)
         header, part, names = layer.header, layer.part, layer.colour
     width, height = window_size(header.data_window)
     planes = _planes(path, part, names)
@@ -130,8 +130,8 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
     if array.size == 0 or (array.ndim == 3 and array.shape[2] != len(names)) or not names:
         raise ValueError(f"write_exr takes (h, w), (h, w, 3) or (h, w, 4), not {array.shape}")
     if half:
-        held = np.clip(array, -HALF_MAX, HALF_MAX, where=np.isfinite(array), out=array.copy())
-        array = held.astype(np.float16)
+        clipped = np.clip(array, -HALF_MAX, HALF_MAX, where=np.isfinite(array), out=array.copy())
+        array = clipped.astype(np.float16)
     planes = {name: np.ascontiguousarray(array[..., i] if array.ndim == 3 else array) for i, name in enumerate(names)}
     # Through memory: the library swallows a full disk when it writes its table of chunks last.
     stream = io.BytesIO()
@@ -144,14 +144,14 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
         write_bytes(path, content)
 
 
-def _supported(path: Path) -> tuple[ExrLayer, str]:
-    """What to read of `path`, and `choose_layer`'s note; raises `BadInputError` where `read_exr` has no meaning."""
+def _layer_to_read(path: Path) -> tuple[ExrLayer, str]:
+    """The layer to read of `path`, and `choose_layer`'s note; raises `BadInputError` where `read_exr` can't read it."""
     layer, note = choose_layer(parse_headers(path), path)
     header = layer.header
     x, y = header.data_window[:2]
     for name in (*layer.colour, *([layer.alpha] if layer.alpha else [])):
-        halved = layer.has_chroma and name.upper().endswith(("RY", "BY"))
-        if header.channels[name] not in ([(1, 1), (2, 2)] if halved and x % 2 == y % 2 == 0 else [(1, 1)]):
+        may_be_halved = layer.has_chroma and name.upper().endswith(("RY", "BY"))
+        if header.channels[name] not in ([(1, 1), (2, 2)] if may_be_halved and x % 2 == y % 2 == 0 else [(1, 1)]):
             raise BadInputError(f"Picture '{path}' holds subsampled channels, which isn't supported; write it as RGB.")
     (width, height), (data_width, data_height) = header.size, window_size(header.data_window)
     if width * height > max(1 << 24, 16 * data_width * data_height):
@@ -163,7 +163,7 @@ def _supported(path: Path) -> tuple[ExrLayer, str]:
 
 
 def _place(plane: np.ndarray, header: ExrHeader, fill: float) -> np.ndarray:
-    """Move `plane` from the data window into the display window; `fill` where it says nothing."""
+    """Move `plane` from the data window into the display window; `fill` outside of the data."""
     width, height = header.size
     placed = np.full((height, width, *plane.shape[2:]), fill, np.float32)
     x = header.data_window[0] - header.display_window[0]

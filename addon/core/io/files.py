@@ -1,4 +1,4 @@
-"""Files of a capture: read with care, and within its folder, unless the user allows more."""
+"""Reading files of a capture safely, and only within its folder unless the user allows more."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -14,7 +14,7 @@ MAX_TEXT: Limit[int] = 1 << 28
 
 
 class EscapesError(BadInputError):
-    """A path leads out of the capture's folder: no slip of one frame, so it is told at once."""
+    """A path leads out of the capture's folder: not one frame's mistake, so it is reported at once."""
 
 
 def absence(path: Path) -> str:
@@ -24,30 +24,30 @@ def absence(path: Path) -> str:
 
 def check_picture(path: Path) -> None:
     """Raise `BadInputError` where no picture can be read at `path`."""
-    if what := absence(path):
-        raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
+    if reason := absence(path):
+        raise BadInputError(f"Picture '{path}' {reason}; check the capture's paths.")
 
 
 @contextmanager
 def readable(what: str, remedy: str = "check the file and its rights") -> Iterator[None]:
-    """Turn what the system refuses as `what` is read into one sentence, a `BadInputError`."""
+    """Turn an `OSError` while `what` is read into a `BadInputError`, one sentence long."""
     try:
         yield
     except OSError as error:
         raise BadInputError(f"{what} can't be read ({error.strerror or error}); {remedy}.") from error
 
 
-def read_bytes(path: Path, what: str = "", most: int = -1) -> bytes:
-    """A file's content, or the first `most` bytes of it; errors name it as `what` 'path'."""
+def read_bytes(path: Path, what: str = "", max_bytes: int = -1) -> bytes:
+    """A file's content, or the first `max_bytes` bytes of it; errors name it as `what` 'path'."""
     with readable(f"{what}'{path}'"), open(path, "rb") as file:
-        return file.read(most)
+        return file.read(max_bytes)
 
 
 def _content(path: Path) -> str:
     """The text of `path`; a ValueError where it is none, a `BadInputError` where it can't be read or is too large."""
     with readable(f"'{path}'", "check the capture"):
-        if what := absence(path):
-            raise BadInputError(f"'{path}' {what}; check the capture.")
+        if reason := absence(path):
+            raise BadInputError(f"'{path}' {reason}; check the capture.")
         if path.stat().st_size > MAX_TEXT:
             raise BadInputError(f"'{path}' is too large for a table of a capture; export it again.")
         return path.read_text(encoding="utf-8-sig")

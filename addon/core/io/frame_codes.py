@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from ..errors import BadInputError
 from ..scene.model import AUTO, Frame
-from .pictures import picture_bits, unstated
+from .pictures import picture_bits, unstated_curve
 from .transfer import check_transfer, clip_level
 
 
@@ -36,7 +36,7 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
             result.append(frame)
             continue
         if not transfer:
-            problems.append(unstated(frame.path))
+            problems.append(unstated_curve(frame.path))
             continue
         limits = [clip_level(depth, transfer) if depth else float("inf") for depth in bits]
         shots = tuple(

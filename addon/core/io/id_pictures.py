@@ -13,9 +13,9 @@ from .exr_header import parse_headers
 from .oiio import PNG, read_coded
 from .pictures import EXR, picture_kind, picture_size
 
-OFF: Limit[float] = 0.02
+MAX_FRACTION: Limit[float] = 0.02
 """An id in a float channel is this near to a whole number; further off, pictures were blended or are no ids."""
-EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
+MAX_EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
 """Up to here floats of so many bytes hold every whole number."""
 
 
@@ -43,7 +43,7 @@ def read_ids(frame: Frame) -> np.ndarray:
         raise BadInputError(f"Frame '{frame.name}' has no picture of ids; give it one.")
     path = frame.id_path
     if picture_kind(path) == EXR:
-        return _whole(read_numbers(path), path)
+        return _whole_numbers(read_numbers(path), path)
     if picture_kind(path) != PNG:
         raise BadInputError(f"Picture '{path}' is no OpenEXR or PNG file; ids need one that loses nothing.")
     pixels = read_coded(path).colour
@@ -54,7 +54,7 @@ def read_ids(frame: Frame) -> np.ndarray:
     return pixels[..., 0] + step * pixels[..., 1] + step**2 * pixels[..., 2]
 
 
-def _whole(stored: np.ndarray, path: Path) -> np.ndarray:
+def _whole_numbers(stored: np.ndarray, path: Path) -> np.ndarray:
     """The ids in the channels ((h, w, c)) of an OpenEXR file."""
     values = stored[..., 0]
     if not np.isfinite(stored).all():
@@ -66,13 +66,13 @@ def _whole(stored: np.ndarray, path: Path) -> np.ndarray:
     if values.dtype.kind != "f":
         return values.astype(np.int64)
     ids = np.rint(values.astype(np.float64))
-    if np.abs(values - ids).max(initial=0) > OFF:
+    if np.abs(values - ids).max(initial=0) > MAX_FRACTION:
         raise BadInputError(
             f"Picture '{path}' has values between whole numbers, which are no ids; write it without filtering."
         )
-    if np.abs(ids).max(initial=0) > EXACT[values.dtype.itemsize]:
+    if np.abs(ids).max(initial=0) > MAX_EXACT[values.dtype.itemsize]:
         raise BadInputError(
-            f"Picture '{path}' has ids above {EXACT[values.dtype.itemsize]}, which its floats can't "
+            f"Picture '{path}' has ids above {MAX_EXACT[values.dtype.itemsize]}, which its floats can't "
             "hold; write them as whole numbers (uint), or number them from 0."
         )
     return ids.astype(np.int64)

@@ -74,22 +74,22 @@ def assign(
         names = {int(i): f"object_{i}" for i in present if 0 <= i <= MAX_ID}
     names = {i: writable(name) for i, name in names.items()}
     known = np.isin(present, np.fromiter(names, np.int64, len(names)))
-    kept = present[known]
-    instances = [Instance(int(i), names[int(i)]) for i in kept]
-    idle = sorted(set(names) - {int(i) for i in kept})
+    known_ids = present[known]
+    instances = [Instance(int(i), names[int(i)]) for i in known_ids]
+    idle = sorted(set(names) - {int(i) for i in known_ids})
     if idle:
         warnings.append(
             f"{len(idle)} of the objects in {names_file} have no triangles and are left out: "
             f"{_few([f'{i} ({names[i]})' for i in idle])}."
         )
-    loose = ~np.isin(object_id, kept)
+    loose = ~np.isin(object_id, known_ids)
     result = object_id.copy()
     if loose.any():
-        number = int(max([*kept.tolist(), *(i for i in names), -1])) + 1
+        number = int(max([*known_ids.tolist(), *(i for i in names), -1])) + 1
         if number > MAX_ID:
             number = next(i for i in range(MAX_ID) if i not in names)
         result[loose] = number
-        instances = sorted([*instances, Instance(number, "unlabelled")], key=lambda one: one.object_id)
+        instances = sorted([*instances, Instance(number, "unlabelled")], key=lambda instance: instance.object_id)
         warnings.append(
             f"{int(loose.sum())} of {len(object_id)} triangles belong to no object; they become one of "
             f"their own, 'unlabelled' (object_id {number})."

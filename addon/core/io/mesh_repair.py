@@ -1,4 +1,4 @@
-"""Take out of a mesh what no later stage can use: triangles without area, vertices that are not finite."""
+"""Mesh repair: removes triangles without area and vertices that are not finite."""
 
 from dataclasses import replace
 
@@ -10,9 +10,9 @@ from .layout import RawMesh
 
 MAX_COORDINATE: Limit[float] = 1e6
 """Metres; beyond, single precision (rays, atlas) can't hold a room."""
-THIN: Unit[float] = 1e-12
+MIN_HEIGHT: Unit[float] = 1e-12
 """A triangle whose height is below this share of its longest edge has no area."""
-USUAL_EXTENT: Limit[tuple[float, float]] = (0.1, 1000.0)
+PLAUSIBLE_EXTENT: Limit[tuple[float, float]] = (0.1, 1000.0)
 """Metres; a room outside of this was likely exported in another unit."""
 
 
@@ -51,12 +51,12 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
         raise BadInputError(f"Mesh '{name}' has no triangle with an area; export the room's surface again.")
     vertices, triangles = mesh.vertices, mesh.triangles[good]
     if not finite.all():
-        number = np.cumsum(finite) - 1
-        vertices, triangles = vertices[finite], number[triangles].astype(np.int32)
+        new_index = np.cumsum(finite) - 1
+        vertices, triangles = vertices[finite], new_index[triangles].astype(np.int32)
     ids = None if mesh.object_id is None else mesh.object_id[good]
     uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[good], nan=0.0, posinf=0.0, neginf=0.0)
     extent = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
-    if not USUAL_EXTENT[0] <= extent <= USUAL_EXTENT[1]:
+    if not PLAUSIBLE_EXTENT[0] <= extent <= PLAUSIBLE_EXTENT[1]:
         warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
     lit = None if mesh.lit is None else mesh.lit.part(good)
     return replace(mesh, vertices=vertices, triangles=triangles, object_id=ids, uv=uv, lit=lit), warnings
@@ -65,6 +65,6 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
 def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Whether each triangle has three corners apart from one line, (t,) bool."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
-    return doubled > THIN * longest
+    doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest_squared = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
+    return doubled_area > MIN_HEIGHT * longest_squared

@@ -30,11 +30,11 @@ FILE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json")
 """Read one after the other where `FILE` is absent; the test split is left alone."""
 TEST_SPLIT = "transforms_test.json"
-BEFORE: Code[list[list[float]]] = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
+COLMAP_TO_NERFSTUDIO: Code[list[list[float]]] = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
 """What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
-MOST, FEW = 0.9, 0.1
-"""The mesh counts as one of the original world where, moved to the poses' world, its box holds more than `MOST` of the
-cameras, and else fewer than `FEW`."""
+MOST_INSIDE, FEW_INSIDE = 0.9, 0.1
+"""The mesh counts as one of the original world where its box holds more than `MOST_INSIDE` of the cameras when moved to
+the poses' world, and fewer than `FEW_INSIDE` otherwise."""
 
 
 def find(root: Path) -> list[Path]:
@@ -227,7 +227,7 @@ def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
     """
     matrix = top.get("applied_transform")
     if matrix is None and (root / "colmap/sparse/0").is_dir():
-        matrix = BEFORE
+        matrix = COLMAP_TO_NERFSTUDIO
     scale = top.get("applied_scale", 1.0)
     try:
         result = np.eye(4)
@@ -262,7 +262,7 @@ def _in_frames_world(
     moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     if reading.convention != AS_READ and frames:
         after, before = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
-        if after > MOST and before < FEW:
+        if after > MOST_INSIDE and before < FEW_INSIDE:
             return replace(mesh, vertices=moved), [
                 f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {after:.0%} of "
                 f"the cameras are then within its box, and {before:.0%} else; --convention {AS_READ} leaves it."

@@ -15,9 +15,9 @@ import numpy as np
 from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.lens import Lens
+from ..scene.lens_json import lens_from_json
 from ..scene.lenses import Cropped, Equirectangular
 from ..scene.lenses_colmap import polynomial
-from ..scene.lenses_told import lens_of
 from ..scene.model import Camera
 from .pictures import picture_size
 
@@ -28,7 +28,7 @@ RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4", "k5", "k6"), ("p1", "p2")
 LISTED = "distortion_params"
 D = TypeVar("D", float, None)
 OWN_LENS = "scan_relight_lens"
-"""A frame's lens as `lenses_told` writes it; stands in captures of a scene, which know more lenses than nerfstudio."""
+"""A frame's lens as `lens_json` writes it; stands in captures of a scene, which know more lenses than nerfstudio."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def read_camera(entry: Entry, picture: Path, pose: np.ndarray) -> Camera:
 
 def _own_lens(stored_lens: Any, name: str) -> Lens | None:
     try:
-        return lens_of(stored_lens)
+        return lens_from_json(stored_lens)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise BadInputError(f"Frame '{name}' has a {OWN_LENS} that is none; capture the scene again.") from error
 

@@ -174,12 +174,12 @@ def _checked(file: Any, path: Path) -> Header:
         raise BadInputError(
             f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG or EXR."
         )
-    most = math.inf
+    max_bytes = math.inf
     if file.format_name() == "png":
-        bits, colour = _png_kind(path)
-        larger = 4 if colour == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
-        most = max(LITTLE, larger * MAX_RATIO * path.stat().st_size) * 8 / min(bits, 8)
-    check_claim(path, width, height, spec.image_bytes(), most)
+        bits, colour_type = _png_kind(path)
+        expansion = 4 if colour_type == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
+        max_bytes = max(LITTLE, expansion * MAX_RATIO * path.stat().st_size) * 8 / min(bits, 8)
+    check_claim(path, width, height, spec.image_bytes(), max_bytes)
     return Header(width, height, DEPTHS[depth])
 
 

@@ -16,29 +16,29 @@ MAX_PIXELS: Limit[int] = 1 << 26
 
 
 MIN_BYTES: Limit[float] = 1 / 64
-"""Bytes that a pixel of a camera's picture takes in its file at least: the noise of a sensor compresses no further."""
+"""Minimum bytes per pixel in a camera's picture file: sensor noise compresses no further."""
 FREE_PIXELS: Limit[int] = 1 << 22
-"""A picture of so many pixels may take fewer: it costs little, whatever it claims."""
+"""Up to so many pixels a picture may take fewer bytes: it costs little memory, whatever its header claims."""
 LARGE: Limit[tuple[int, int]] = (1 << 28, 400)
-"""Bytes of pixels beyond which a file has to hold one for so many of them, whatever its pixels are."""
+"""Bytes of pixels that any file may hold, and the ratio of pixel bytes to file bytes allowed beyond that."""
 
 
 def too_large(stored: int, size: int) -> bool:
-    """Whether so many bytes of pixels (`stored`) are out of all proportion to a file of `size` bytes."""
+    """Whether `stored` bytes of pixels are implausible for a file of `size` bytes."""
     return stored > max(LARGE[0], LARGE[1] * size)
 
 
-def check_claim(path: Path, width: int, height: int, stored: int, most: float = math.inf) -> None:
+def check_claim(path: Path, width: int, height: int, stored: int, max_stored: float = math.inf) -> None:
     """Raise `BadInputError` where a picture's header claims too much, before room for any pixel is made.
 
     Parameters
     ----------
     stored : int
         Bytes that its pixels take.
-    most : float
-        Bytes of pixels that such a file can hold, where its format tells.
+    max_stored : float
+        Bytes of pixels that a file of this format can hold, where known.
     """
-    if not 0 < width * height <= MAX_PIXELS or stored > most or too_large(stored, path.stat().st_size):
+    if not 0 < width * height <= MAX_PIXELS or stored > max_stored or too_large(stored, path.stat().st_size):
         raise BadInputError(
             f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write or copy it again."
         )
@@ -46,7 +46,7 @@ def check_claim(path: Path, width: int, height: int, stored: int, most: float = 
 
 @contextmanager
 def decoding(path: Path, what: str = "Picture") -> Iterator[None]:
-    """Turn whatever a library raises at the picture (`what`) `path` into one sentence, a `BadInputError`."""
+    """Turn any error of a library that reads the picture (`what`) `path` into a `BadInputError`, one sentence long."""
     try:
         yield
     except ScanRelightError:
@@ -56,7 +56,7 @@ def decoding(path: Path, what: str = "Picture") -> Iterator[None]:
 
 
 def too_few_bytes(width: int, height: int, size: int) -> bool:
-    """Whether a camera's picture of so many pixels can't be in a file of `size` bytes: it was made to fill memory."""
+    """Whether a file of `size` bytes is too small for a camera's picture of this size: a decompression bomb."""
     return width * height > max(FREE_PIXELS, size / MIN_BYTES)
 
 
@@ -67,12 +67,12 @@ def turn(pixels: np.ndarray, orientation: int) -> np.ndarray:
     """
     if orientation > 4:
         pixels = pixels.swapaxes(0, 1)
-    down, right = signs(orientation)
-    return pixels[::down, ::right]
+    row_step, column_step = signs(orientation)
+    return pixels[::row_step, ::column_step]
 
 
 def signs(orientation: int) -> tuple[int, int]:
-    """Whether rows and columns run backwards (-1) in EXIF's `orientation`; from 5 on once they changed places."""
+    """Steps (1, or -1: reversed) along rows and columns in EXIF's `orientation`; from 5 on after transposition."""
     return {1: (1, 1), 2: (1, -1), 3: (-1, -1), 0: (-1, 1)}[orientation % 4] if 1 <= orientation <= 8 else (1, 1)
 
 
@@ -85,7 +85,7 @@ class Picture(NamedTuple):
         Linear; NaN where the display window is larger than the data.
     alpha : (h, w) float32 or None
     to_rec709 : (3, 3) float32 or None
-        What the pixels of codes are still to be multiplied by once they are linear; None: they are Rec.709.
+        Matrix to linear Rec.709 that is still to be applied to decoded codes; None: they are Rec.709.
     """
 
     rgb: np.ndarray

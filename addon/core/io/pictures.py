@@ -1,4 +1,4 @@
-"""Pictures of every kind that a frame or mask may be stored in. The kind is told by the content, not by the name."""
+"""Reading frames and masks of every supported picture format, recognised by content, not by file name."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from .transfer import decode
 
 EXR, HDR = "OpenEXR", "Radiance HDR"
 ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".heic", ".heif", ".hif", ".dng")
-"""Of files that can be pictures, in the order in which a missing ending is tried."""
+"""Endings of picture files, in the order in which a missing ending is tried."""
 
 
 def picture_kind(path: Path) -> str:
@@ -68,7 +68,7 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
 
 
 def picture_orientation(path: Path) -> int:
-    """EXIF's number of how a camera was held, 1 (as it is stored, or untold) to 8. Raises as `picture_size`."""
+    """EXIF's orientation, 1 (as stored, or not stated) to 8. Raises as `picture_size`."""
     kind = picture_kind(path)
     if kind in CODED:
         return coded_orientation(path)
@@ -76,7 +76,7 @@ def picture_orientation(path: Path) -> int:
 
 
 def picture_bits(path: Path) -> int:
-    """Bits of a channel that holds codes of a curve, 8 or 16; 0 of linear floats. Raises as `picture_size`."""
+    """Bits of a channel of curve-encoded codes, 8 or 16; 0 of linear floats. Raises as `picture_size`."""
     kind = picture_kind(path)
     return heif_header(path).bits if kind == HEIC else coded_header(path).bits if kind in CODED else 0
 
@@ -110,7 +110,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         rgb = read_raw(path).rgb
         return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
     if not transfer and picture_bits(path):
-        raise BadInputError(unstated(path))
+        raise BadInputError(unstated_curve(path))
     colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
     if turned:
         orientation = picture_orientation(path)
@@ -123,8 +123,8 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, profile_to_rec709(profile))
 
 
-def unstated(path: Path) -> str:
-    """The sentence on a picture of codes whose curve nobody told."""
+def unstated_curve(path: Path) -> str:
+    """The error message for a picture of codes whose curve is not stated."""
     return (
         f"Picture '{path}' holds 8 or 16-bit codes among frames of floats; make all frames alike, or give the codes' "
         "curve with --transfer (auto, srgb, linear, or a gamma such as 2.2)."

@@ -1,4 +1,4 @@
-"""What a frame measured: its pictures read, exposure divided out, brackets merged, pixels that say nothing marked."""
+"""Radiance of a frame: pictures read, exposure divided out, brackets merged, invalid pixels marked."""
 
 from dataclasses import replace
 
@@ -37,9 +37,9 @@ def read_pixels(frame: Frame) -> Pixels:
     if frame.margin:
         for edge in (seen, seen[::-1], seen.T, seen.T[::-1]):
             edge[: frame.margin] = False
-    led = pixel_rays(frame.camera)[1] if frame.camera.lens is not None else None
-    if led is not None:  # beyond the lens's image circle
-        seen &= led
+    in_image_circle = pixel_rays(frame.camera)[1] if frame.camera.lens is not None else None
+    if in_image_circle is not None:  # beyond the lens's image circle
+        seen &= in_image_circle
     if frame.brackets:
         shots = sorted(frame.shots, key=lambda s: s.exposure)
         radiance, valid, saturated = merge(_exposed(frame, shot, seen) for shot in shots)

@@ -1,4 +1,4 @@
-"""Writes PNGs with zlib alone: what the page, textures and previews need depends on no library."""
+"""Writing PNG with zlib alone, so that the page, textures and previews need no library."""
 
 import base64
 import struct
@@ -38,5 +38,5 @@ def write_png(path: Path | str, image: np.ndarray) -> None:
 
 
 def data_address(image: np.ndarray) -> str:
-    """The same as an address that a page can hold in itself."""
+    """The PNG as a data URL, which a page can embed."""
     return "data:image/png;base64," + base64.b64encode(png(image)).decode("ascii")

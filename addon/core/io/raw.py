@@ -19,17 +19,17 @@ from .picture import Picture, check_claim, decoding
 
 DNG = "DNG"
 DNG_VERSION: Code[int] = 50706
-"""The tag that tells a DNG from another TIFF."""
-HEAD: Limit[int] = 1 << 16
-"""Bytes in which the first directory has to end; a DNG begins with it, as its specification recommends."""
-TOP: Code[int] = 65535
+"""The tag that distinguishes a DNG from other TIFFs."""
+HEAD_BYTES: Limit[int] = 1 << 16
+"""Bytes within which the first directory has to end; the specification recommends to put it first."""
+MAX_VALUE: Code[int] = 65535
 """LibRaw's greatest value, at which the sensor clips."""
 
 
 def is_dng(path: Path) -> bool:
     """Whether a file that begins as a TIFF is a DNG."""
     try:
-        return DNG_VERSION in exif.read_tags(read_bytes(path, "Picture ", HEAD))
+        return DNG_VERSION in exif.read_tags(read_bytes(path, "Picture ", HEAD_BYTES))
     except ValueError:  # of another order, or its directory lies behind the pixels
         return False
 
@@ -68,7 +68,7 @@ def read_raw(path: Path) -> Picture:
         )
         if values.shape != (file.sizes.height, file.sizes.width, 3):
             raise ValueError("other pixels than its header says")
-    return Picture(values.astype(np.float32) / np.float32(TOP), None)
+    return Picture(values.astype(np.float32) / np.float32(MAX_VALUE), None)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from ..errors import BadInputError
-from ..origin import of_point, of_thing
+from ..origin import package_of, package_of_entry_point
 from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, stray, textured, traj
 from .layout import Layout, Reader, Reading
 
@@ -56,8 +56,8 @@ def _of_packages() -> tuple[Reader, ...]:
 def origin(name: str) -> str:
     """The package that the reader of a format comes from, and its version; "" for the program's own."""
     if name in _registered:
-        return of_thing(_registered[name].read)
-    return next((of_point(point) for point in entry_points(group=GROUP) if point.name == name), "")
+        return package_of(_registered[name].read)
+    return next((package_of_entry_point(point) for point in entry_points(group=GROUP) if point.name == name), "")
 
 
 def _loaded(point: EntryPoint) -> Reader:

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.model import Camera, Frame
-from .arkit import FUSE, MOST, read_pose, read_y_up
+from .arkit import FUSE, MAX_FRAMES, read_pose, read_y_up
 from .files import read_json
 from .formats import FORMATS
 from .layout import Layout, Reader, Reading, usable
@@ -55,8 +55,8 @@ def read(root: Path, reading: Reading) -> Layout:
     if not pictures:
         raise BadInputError(f"Folder '{folder}' has no pictures called 0.jpg and so on; export the recording again.")
     chosen = sorted(pictures)
-    if len(chosen) > MOST:
-        chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, MOST).astype(int)]
+    if len(chosen) > MAX_FRAMES:
+        chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, MAX_FRAMES).astype(int)]
 
     def frame(index: int) -> Frame:
         if index >= len(poses):

@@ -112,7 +112,7 @@ def _sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
     leave. Raises `BadInputError` where the file does not list each of `faces` faces once.
     Source: Habitat, `PTexMeshData.cpp`.
     """
-    content = read_bytes(path, most=64 + 12 * faces)  # more than a chunk for each face takes
+    content = read_bytes(path, max_bytes=64 + 12 * faces)  # more than a chunk for each face takes
     words = np.frombuffer(content[: len(content) // 4 * 4], "<u4").astype(np.int64)
     chunks, at = [], 2
     while at + 2 <= len(words):

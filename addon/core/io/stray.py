@@ -14,7 +14,7 @@ from ..errors import BadInputError
 from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from . import video
-from .arkit import FUSE, MOST, read_pose, read_y_up
+from .arkit import FUSE, MAX_FRAMES, read_pose, read_y_up
 from .files import check_links, read_text
 from .formats import FORMATS
 from .layout import Layout, Reader, Reading, holding, usable
@@ -24,7 +24,7 @@ from .traj import TO_OPENGL
 
 VIDEO, POSES, MATRIX = "rgb.mp4", "odometry.csv", "camera_matrix.csv"
 POSE, LENS = ("qx", "qy", "qz", "qw", "x", "y", "z"), ("fx", "fy", "cx", "cy")
-LONGEST: Limit[int] = 1 << 22
+MAX_FRAME_NUMBER: Limit[int] = 1 << 22
 """Frames of 19 hours."""
 OFF_CENTRE: Limit[float] = 0.1
 """How far a phone's principal point may lie from the middle, as a share of a side; it lies within 0.02."""
@@ -45,7 +45,7 @@ def read(root: Path, reading: Reading) -> Layout:
     if not reading.outside:
         check_links(root, VIDEO, [root / VIDEO])
     numbers = np.array(sorted(rows))
-    pictures = video.frames(root / VIDEO, np.array_split(numbers, min(MOST, len(numbers))))
+    pictures = video.frames(root / VIDEO, np.array_split(numbers, min(MAX_FRAMES, len(numbers))))
     if not pictures:
         raise BadInputError(f"Folder '{root}' has no pictures in the folder of its video; delete that folder.")
 
@@ -79,7 +79,7 @@ def _rows(root: Path) -> dict[int, dict[str, float]]:
         whole = dict(zip(LENS, (matrix[k] for k in (0, 4, 2, 5)))) if len(matrix) == 9 else {}
     rows = [whole | dict(zip(head, map(_number, line))) for line in lines]
     numbered = ((row.get("frame", float(i)), row) for i, row in enumerate(rows))
-    by_number = {int(number): row for number, row in numbered if 0 <= number < LONGEST}
+    by_number = {int(number): row for number, row in numbered if 0 <= number < MAX_FRAME_NUMBER}
     if not set(POSE) <= set(head) or not by_number:
         raise BadInputError(f"'{root / POSES}' lists no poses ({', '.join(POSE)}); export the recording again.")
     return by_number

@@ -101,9 +101,9 @@ def _pictures(folder: Path) -> dict[int, Path]:
 
 def _mesh(root: Path, reading: Reading) -> RawMesh:
     """The mesh that is named, or in the folder, or beside it under the folder's name."""
-    own = [p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED)]
+    meshes = [p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED)]
     beside = root.absolute().parent / f"{root.absolute().name}_mesh.ply"
-    if reading.mesh is None and not own and beside.is_file():
+    if reading.mesh is None and not meshes and beside.is_file():
         return read_mesh(beside, reading)
     return read_mesh(find_mesh(root, reading), reading)
 

@@ -16,10 +16,10 @@ from ..scene.model import AUTO
 
 SRGB, LINEAR = "srgb", "linear"
 CODES: Code[str] = "codes"
-"""In place of a curve where the stored codes are asked for: not even their primaries are converted."""
+"""In place of a curve: the stored codes as they are, without conversion of primaries."""
 GAMMAS: Limit[tuple[float, float]] = (0.1, 10.0)
-"""Bounds of a gamma that anyone can mean."""
-TOP = {8: 253.5 / 255, 16: 1 - 2.0**-12}
+"""Bounds of a plausible gamma."""
+CLIP_SHARE = {8: 253.5 / 255, 16: 1 - 2.0**-12}
 """Share of the greatest code from which on a value counts as clipped: JPEG rings by a code or two, and 12 bits that
 were shifted into 16 end there."""
 
@@ -48,8 +48,8 @@ def decode(codes: np.ndarray, transfer: str) -> np.ndarray:
 def clip_level(bits: int, transfer: str) -> float:
     """The linear value from which on a picture of `bits` a channel counts as clipped; of `AUTO`, the code."""
     if transfer == AUTO:
-        return TOP[bits]
-    return float(to_linear(np.array(TOP[bits]), transfer))
+        return CLIP_SHARE[bits]
+    return float(to_linear(np.array(CLIP_SHARE[bits]), transfer))
 
 
 @functools.lru_cache(maxsize=8)

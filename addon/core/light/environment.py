@@ -28,7 +28,7 @@ class Zone:
         How far each direction belongs to it, 0...1.
     pattern : (h, 2h) float32
         Its radiance at a mean of 1, times the weight.
-    told : bool
+    measured : bool
         Frames show radiance on its side of the horizon.
     clipped : bool
         Of what frames saw of it only a lower bound is known.
@@ -36,7 +36,7 @@ class Zone:
 
     weight: np.ndarray
     pattern: np.ndarray
-    told: bool = False
+    measured: bool = False
     clipped: bool = False
 
 
@@ -79,7 +79,7 @@ class Environment:
         return bool(self.observations.any())
 
     @property
-    def told(self) -> np.ndarray:
+    def measured(self) -> np.ndarray:
         """Directions whose radiance frames show: seen, and not clipped; (h, 2h) bool."""
         return (self.observations > 0) & ~self.clipped
 
@@ -143,7 +143,7 @@ class Environment:
         if chosen.any():
             cell_number = (row // cell * width + column // cell).ravel()[chosen]
             part[chosen] = np.unique(cell_number, return_inverse=True)[1].ravel()
-        part, known = part.reshape(height, width), self.clipped | self._wide(self.told)
+        part, known = part.reshape(height, width), self.clipped | self._wide(self.measured)
         return np.where(self.observations > 0, part, part.ravel()[self._to(known)[1]]) if known.any() else part
 
     def shown_in(self, directions: np.ndarray) -> Environment:
@@ -190,7 +190,7 @@ class Environment:
         profile = self._profile()[:, None]
         zones, remaining = [], self.clipped
         for side in (above, ~above):
-            zone_weight, known = np.where(side, weight, np.float32(0)), self.told & side
+            zone_weight, known = np.where(side, weight, np.float32(0)), self.measured & side
             if _by_solid_angle(self.clipped & side).sum() > _by_solid_angle(known).sum():
                 zone_weight, remaining = np.where(side & self.clipped, np.float32(1), zone_weight), remaining & ~side
                 zones.append(Zone(zone_weight, zone_weight, clipped=True))
@@ -203,7 +203,7 @@ class Environment:
     def _profile(self) -> np.ndarray:
         """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
         height = len(self.observations)
-        observed = self.told
+        observed = self.measured
         rows = np.flatnonzero(observed.any(1))
         if not len(rows):
             return np.ones(height, np.float32)
@@ -243,7 +243,7 @@ class Environment:
 
     def known(self, directions: np.ndarray) -> np.ndarray:
         """Whether frames show the radiance from unit `directions` ((n, 3)), (n,) bool."""
-        return self.at(self.told, directions)
+        return self.at(self.measured, directions)
 
 
 def _bin(directions: np.ndarray, height: int) -> np.ndarray:

@@ -60,7 +60,7 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     return seen & np.isin(atlas.object_id, bright)
 
 
-def evened(field: LightField) -> np.ndarray:
+def filled_radiance(field: LightField) -> np.ndarray:
     """L_d with the likely radiance of elements that nobody saw, (n, 3) float32: they are dark in `field`.
 
     The field's `unseen`, else the median of its object; nothing where nobody saw anything of the object.

@@ -132,7 +132,7 @@ def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
     A clipped sun is none that was seen: its light is solved for.
     """
     luminance = environment.radiance @ LUMINANCE
-    seen = environment.told
+    seen = environment.measured
     if not seen.any():
         return environment, None
     directions, solid_angle = _directions(len(luminance))

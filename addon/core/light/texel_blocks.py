@@ -68,7 +68,7 @@ class TexelBlocks:
         Parameters
         ----------
         function : callable
-            Takes indices ((k,) int, into the elements wanted), gives values ((k, c) float32). Asked once for each.
+            Takes indices ((k,) int, into the elements wanted), gives values ((k, c) float32). Each index comes once.
         step : int
             Edge of the largest blocks in texels, a power of two; below 2 everything is evaluated.
         tolerance : float

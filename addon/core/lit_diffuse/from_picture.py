@@ -8,7 +8,7 @@ from ..errors import BadInputError
 from ..io.base_colour import as_file
 from ..io.oiio import CODED, Stored, read_coded
 from ..io.pictures import picture_kind, picture_size, read_picture
-from ..io.transfer import TOP, decode
+from ..io.transfer import CLIP_SHARE, decode
 from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
@@ -125,7 +125,7 @@ def _sums(mesh: Mesh, texture: LitTexture, atlas: Atlas, element: np.ndarray, st
             linear, clipped = np.maximum(np.nan_to_num(value), 0), np.zeros(len(value), bool)
         else:
             linear, maximum = decode(value, texture.transfer), np.iinfo(value.dtype).max
-            clipped = (value >= TOP[8 * value.dtype.itemsize] * maximum).any(-1)
+            clipped = (value >= CLIP_SHARE[8 * value.dtype.itemsize] * maximum).any(-1)
         result[known, :3] += linear[known]
         result[:, 3] += known
         result[:, 4] += known & clipped

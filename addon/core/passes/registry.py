@@ -15,7 +15,7 @@ from importlib.metadata import entry_points
 from typing import Any, TypeVar
 
 from ..errors import BadInputError, ScanRelightError
-from ..origin import of_point, of_thing
+from ..origin import package_of, package_of_entry_point
 from ..stages import RUN_STAGES
 
 GROUP = "scan_relight.passes"
@@ -180,7 +180,7 @@ def followed(stage: str, value: T, before: Mapping[str, Any], without: Collectio
     """
     for pass_ in following(stage, without):
         assert pass_.run is not None
-        subject = f"The pass '{pass_.name}' of '{pass_.origin or of_thing(pass_.run)}'"
+        subject = f"The pass '{pass_.name}' of '{pass_.origin or package_of(pass_.run)}'"
         try:
             result = pass_.run(value, before)
         except ScanRelightError:
@@ -200,6 +200,6 @@ def _register_installed() -> None:
     """Register, once, what installed packages bring; one that is broken is left out with a warning."""
     for entry in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         try:
-            register(replace(entry.load(), origin=of_point(entry)))
+            register(replace(entry.load(), origin=package_of_entry_point(entry)))
         except Exception as error:  # whatever another package does wrong
             warnings.warn(f"The pass '{entry.name}' can't be loaded ({error!r}); mend it.", stacklevel=2)

@@ -242,11 +242,11 @@ def _owner(run: Corrected) -> np.ndarray:
     return atlas.image(atlas.object_id, -1)
 
 
-def remove_parts(run: Corrected, kept: Collection[str] = ()) -> None:
-    """Take away the parts that an earlier run left, but for the files `kept`."""
+def remove_parts(run: Corrected, keep: Collection[str] = ()) -> None:
+    """Take away the parts that an earlier run left, but for the files `keep`."""
     folder = run.store.folder
     for path in [*folder.glob(f"{FOLDER}/* base_color.exr"), *folder.glob(TILE.replace("<UDIM>", "[0-9]" * 4))]:
-        if path.relative_to(folder).as_posix() not in kept:
+        if path.relative_to(folder).as_posix() not in keep:
             path.unlink()
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..evidence.tier import tier
-from ..origin import of_thing
+from ..origin import package_of
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
 from ..passes.missing_light.params import MISSING
 from ..passes.registry import following
@@ -22,7 +22,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
         "passes_of_packages": [
-            {"name": item.name, "stage": item.stage, "package": item.origin or of_thing(item.run)}
+            {"name": item.name, "stage": item.stage, "package": item.origin or package_of(item.run)}
             for stage in run.done
             for item in following(stage, run.settings.without)
         ],

@@ -20,7 +20,7 @@ from ..memory import peak_memory
 from ..progress import Progress, ProgressEvent
 from ..results.known_white import white_of
 from ..results.overrides import OVERRIDES, Overrides, heeded, merge
-from ..results.place import write_capture
+from ..results.result_folders import write_capture
 from ..results.room_file import ROOM, objects_of, write_room
 from ..results.store import Store
 from ..scene.model import Capture
@@ -47,7 +47,7 @@ def progress_of_run(
 
 
 @dataclass(frozen=True)
-class Asked:
+class Request:
     """What is requested of a run besides its settings.
 
     Attributes
@@ -92,7 +92,7 @@ class Asked:
             raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
 
 
-WHOLE = Asked()
+WHOLE = Request()
 """A whole run."""
 
 
@@ -109,7 +109,7 @@ class Run:
     settings : Settings
     progress : Progress
         In the stage `READ`.
-    asked : Asked
+    request : Request
     versions : mapping of str to str
         What the report names besides Python and its packages.
     started : float
@@ -134,22 +134,22 @@ class Run:
         out_folder: Path,
         settings: Settings,
         progress: Progress,
-        asked: Asked,
+        request: Request,
         versions: Mapping[str, str],
         started: float,
     ):
-        self.capture, self.folder, self._asked, self._started = capture, out_folder, asked, started
+        self.capture, self.folder, self._request, self._started = capture, out_folder, request, started
         self._settings, self._progress, self._versions = settings, progress, dict(versions)
         known_ids = {instance.object_id for instance in capture.instances} | objects_of(out_folder)
-        self._given = heeded(out_folder, known_ids, asked.override, asked.heed_kept)
-        if asked.white:
-            self._given = merge(self._given, Overrides(white=white_of(asked.white, capture)))
-        self._warnings = _look(capture, asked.reading) if capture.frames else []
-        if not asked.heed_kept and (out_folder / OVERRIDES).is_file():
+        self._given = heeded(out_folder, known_ids, request.override, request.heed_kept)
+        if request.white:
+            self._given = merge(self._given, Overrides(white=white_of(request.white, capture)))
+        self._warnings = _look(capture, request.reading) if capture.frames else []
+        if not request.heed_kept and (out_folder / OVERRIDES).is_file():
             self._warnings = [LEFT_OUT, *self._warnings]
 
     def __enter__(self) -> Run:
-        self._store = Store(self.folder, shared=self._asked.block is not None)
+        self._store = Store(self.folder, shared=self._request.block is not None)
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -165,32 +165,32 @@ class Run:
         MissingStageError
             One is to be done alone, and what comes before is not stored.
         """
-        store, asked = self._store, self._asked
-        with told_in_a_sentence(self.folder):
-            if asked.block is None:
+        store, request = self._store, self._request
+        with storage_errors_as_sentences(self.folder):
+            if request.block is None:
                 write_capture(store.folder, self.capture.root)
-                if asked.from_stage in STAGES:
-                    store.drop(STAGES[STAGES.index(asked.from_stage) :])
-                if asked.heed_kept and (asked.override is not None or asked.white):
+                if request.from_stage in STAGES:
+                    store.drop(STAGES[STAGES.index(request.from_stage) :])
+                if request.heed_kept and (request.override is not None or request.white):
                     store.write_json(OVERRIDES, self._given.as_dict())
             self._progress.done()
             self.recovery = Recovery(self.capture, store, self._settings, self._progress, unwrap, self._given)
             for stage in STAGES:
-                if asked.alone and stage != asked.until and store.stored_key(stage) != self.recovery.keys[stage]:
+                if request.alone and stage != request.until and store.stored_key(stage) != self.recovery.keys[stage]:
                     raise MissingStageError(
                         f"Result folder '{self.folder}' holds no stage '{stage}' of this capture, these settings and "
                         "this version; do it first."
                     )
-                if stage == asked.until and asked.block is not None:
-                    getattr(self.recovery, f"{stage}_block")(asked.block)
+                if stage == request.until and request.block is not None:
+                    getattr(self.recovery, f"{stage}_block")(request.block)
                     break
                 getattr(self.recovery, stage)()
-                if stage == asked.until:
+                if stage == request.until:
                     break
-            if asked.until == WRITE:
+            if request.until == WRITE:
                 return {}
             report = self._report(self.recovery.report())
-            if asked.block is None:
+            if request.block is None:
                 store.write_json("report.json", report)
             return report
 
@@ -198,7 +198,7 @@ class Run:
         """Write images, materials.json and the page, what an interface needs, then the scene and report.json."""
         recovery, store = self.recovery, self._store
         recovery.store = store
-        with told_in_a_sentence(self.folder):
+        with storage_errors_as_sentences(self.folder):
             self._progress.stage(WRITE)
             started = time.monotonic()
             recovery.look_closer()
@@ -249,8 +249,8 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
 
 
 @contextmanager
-def told_in_a_sentence(folder: Path) -> Iterator[None]:
-    """Turn what the system refuses while `folder` is written into one sentence."""
+def storage_errors_as_sentences(folder: Path) -> Iterator[None]:
+    """Turn the system's errors while `folder` is written into a `StorageError`, one sentence long."""
     try:
         yield
     except OSError as error:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import barely_seen, evened
+from ..light.few_elements import barely_seen, filled_radiance
 from ..light.field import LightField
 from ..light.lamps import Lamp, LampKinds, lamp_kinds
 from ..light.mirrors import Mirror, known_mirror
@@ -112,7 +112,7 @@ def find_shading(
 def with_patches_of(shading: Shading, patches: Patches) -> Shading:
     """A `Shading` found with `patches` set apart: those that are no lamps or mirrors go back to their objects."""
     mirrors = {mirror.object_id for mirror in shading.mirrors}
-    chosen, number = patches.kept(set(patches.objects) & (shading.emitters | mirrors))
+    chosen, number = patches.subset(set(patches.objects) & (shading.emitters | mirrors))
 
     def renumbered(sources: Any) -> tuple:
         return tuple(replace(source, object_id=number.get(source.object_id, source.object_id)) for source in sources)
@@ -318,7 +318,7 @@ def with_found_light(
     measured: list[int],
 ) -> tuple[LightField, Light]:
     """The room with the light found `missing`; `measured` are the patches whose radiance the frames show."""
-    radiance = evened(dark)
+    radiance = filled_radiance(dark)
     for object_id, solved in missing.radiance.items():
         of_object = dark.atlas.object_id == object_id
         radiance[of_object] = np.maximum(radiance[of_object], solved)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..json_values import key
-from ..origin import of_thing
+from ..origin import package_of
 from ..passes.registry import following, left_out_of, stage_of
 from ..settings import Settings
 from .source import digest
@@ -62,7 +62,7 @@ class Stage:
         declared = {name: getattr(settings, name) for name in self.heeds}
         previous_keys = [previous[stage.name] for stage in self.takes]
         packages = tuple(
-            (item.name, item.origin or of_thing(item.run)) for item in following(self.name, settings.without)
+            (item.name, item.origin or package_of(item.run)) for item in following(self.name, settings.without)
         )
         more += (packages,) if packages else ()
         return key(

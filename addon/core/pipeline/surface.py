@@ -13,7 +13,7 @@ import numpy as np
 from ..kinds import Unit
 from ..lit_diffuse.from_picture import texel_edge
 from ..lit_diffuse.from_texture import face_edge
-from ..origin import OWN, of_thing
+from ..origin import OWN, package_of
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.closed_mesh import as_scanned, with_aligned_closing
 from ..scene.elements import Elements
@@ -60,7 +60,7 @@ def laid_out_by(unwrap: Unwrap) -> str:
         unwrap = unwrap.func
     module = sys.modules[unwrap.__module__]
     name = f"{module.__name__.removeprefix(OWN)}.{getattr(unwrap, '__qualname__', type(unwrap).__qualname__)}"
-    origin = of_thing(unwrap)
+    origin = package_of(unwrap)
     if not origin and module.__file__ is not None:
         origin = digest(Path(module.__file__), CORE.parent)[:16]
     library = version("xatlas") if unwrap is by_xatlas and find_spec("xatlas") else ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..groups import by_number
 from ..light.directions import cosine_patterns, turned
-from ..light.few_elements import evened, pick
+from ..light.few_elements import filled_radiance, pick
 from ..light.field import LightField
 from ..light.lamps import find_seen
 from ..light.over_surface import Gathering, RayCounts, irradiance
@@ -75,16 +75,16 @@ def with_unseen_by_light(field: LightField, good: np.ndarray, **gathering: Unpac
     good : (n,) bool
         Elements whose L_d is reliable.
     """
-    even, atlas, seed = evened(field), field.atlas, gathering["seed"]
+    radiance, atlas, seed = filled_radiance(field), field.atlas, gathering["seed"]
     sample = pick(field, good, seed, LEVELS.sample)
     rays = max(ROUGH["rays"] * LEVELS.sample // len(sample), 1)
     start = np.repeat(field.scene.off_surface(atlas.position[sample], atlas.normal[sample]), rays, 0)
     directions, _ = turned(cosine_patterns(rays, seed), atlas.normal[sample], np.random.default_rng(seed))
     hit_elements = np.unique(field.elements(field.scene.intersect(start, directions.reshape(-1, 3))))
-    dark = hit_elements[(hit_elements >= 0) & even[hit_elements].any(1) & ~field.radiance[hit_elements].any(1)]
+    dark = hit_elements[(hit_elements >= 0) & radiance[hit_elements].any(1) & ~field.radiance[hit_elements].any(1)]
     if not len(dark):
         return field
-    lit_room = field.with_light(even)
+    lit_room = field.with_light(radiance)
     E, reached = (_rough(lit_room, elements, **gathering)[0] for elements in (sample, dark))
     lamps = {lamp.object_id for lamp in find_seen(atlas.object_id[sample], field.radiance[sample], E)}
     typical = np.zeros((int(atlas.object_id.max()) + 1, 3), np.float32)
@@ -93,8 +93,8 @@ def with_unseen_by_light(field: LightField, good: np.ndarray, **gathering: Unpac
             typical[object_id] = np.median(E[members], 0)
     typical = typical[atlas.object_id[dark]]
     valid = (typical > 0).all(1)
-    even[dark[valid]] *= reached[valid] / typical[valid]
-    return field.with_unseen(even)
+    radiance[dark[valid]] *= reached[valid] / typical[valid]
+    return field.with_unseen(radiance)
 
 
 def _rough(field: LightField, element: np.ndarray, **gathering: Unpack[Gathering]) -> tuple[np.ndarray, np.ndarray]:

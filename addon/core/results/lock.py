@@ -54,7 +54,7 @@ def held(path: Path, should_stop: Callable[[], bool] = lambda: False, params: Lo
     path : Path
         In a folder that is there.
     should_stop : callable() -> bool, optional
-        Asked while another has it.
+        Called while another has it.
 
     Raises
     ------

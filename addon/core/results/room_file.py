@@ -15,7 +15,7 @@ from ..brdf.material import ObjectMaterial
 from ..brdf.material import from_json as material
 from ..errors import BadInputError, MissingStageError
 from ..io.files import json_if_sound
-from ..scene.lenses_told import lens_of, told_lens
+from ..scene.lens_json import lens_from_json, lens_to_json
 from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
 from .archive import Damaged, read_archive, write_archive
 
@@ -54,7 +54,7 @@ class Room:
 def run_of(folder: Path | str) -> str:
     """The key of the run that a result folder holds; '' where there is none, or it is older than such keys.
 
-    Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
+    Objects that were made by this run carry the same (`custom_properties.RUN`); the folder holds nothing about others.
     """
     return _text(folder, "run")
 
@@ -103,7 +103,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
                 frame.name,
                 str(frame.path.absolute()),
                 [getattr(frame.camera, name) for name in CAMERA],
-                told_lens(frame.camera.lens),
+                lens_to_json(frame.camera.lens),
             ]
             for frame in capture.frames
         ],
@@ -155,7 +155,7 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
     try:
         metadata, arrays = read_archive(folder / ROOM)
         frames = tuple(
-            Frame(name, Path(path), Camera(width, height, fx, fy, cx, cy, pose, lens_of(lens)))
+            Frame(name, Path(path), Camera(width, height, fx, fy, cx, cy, pose, lens_from_json(lens)))
             for (name, path, (width, height, fx, fy, cx, cy), lens), pose in zip(
                 metadata["frames"], arrays["poses"], strict=True
             )

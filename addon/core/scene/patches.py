@@ -58,7 +58,7 @@ class Patches:
         """Those of them that may be lamps."""
         return [i for i in self.objects if i not in self.mirrors]
 
-    def kept(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
+    def subset(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
         """Those of some objects alone, numbered without gaps; and the new number of each."""
         numbers = dict(zip(sorted(objects), self.objects, strict=False))
         chosen = np.isin(self.object_id, list(numbers))

@@ -24,19 +24,19 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
 def rays_of_rows(camera: Camera, rows: slice) -> tuple[np.ndarray, np.ndarray | None]:
     """`pixel_rays` of some of the rows; a pinhole's large frame is not kept whole for it."""
     width = camera.width
-    if camera.lens is None and width * camera.height > KEPT_PIXELS:
+    if camera.lens is None and width * camera.height > MAX_CACHED_PIXELS:
         return _pinhole_rays(width, rows, camera.fx, camera.fy, camera.cx, camera.cy), None
     local, valid = pixel_rays(camera)
     return local[:, rows.start * width : rows.stop * width], None if valid is None else valid[rows]
 
 
-KEPT_PIXELS: Block[int] = 1 << 22
+MAX_CACHED_PIXELS: Block[int] = 1 << 22
 """Of a pinhole's frame up to which its rays are kept: to make them is a tenth of what tracing them takes."""
-KEPT: Block[int] = 4
+CACHED_LENSES: Block[int] = 4
 """Lenses whose rays are kept: a rig's cameras, or one for each thread; 24 bytes a pixel each."""
 
 
-@functools.lru_cache(maxsize=KEPT)
+@functools.lru_cache(maxsize=CACHED_LENSES)
 def _pixel_rays(
     width: int, height: int, fx: float, fy: float, cx: float, cy: float, lens: Lens | None
 ) -> tuple[np.ndarray, np.ndarray | None]:

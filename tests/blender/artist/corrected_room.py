@@ -75,7 +75,7 @@ def build(folder):
     for entry in ENTRIES:
         thing = objects[entry["object_id"]]
         thing.data.materials.append(bridge("data.materials").make_material(material(entry), image))
-        bridge("marks").mark(thing, folder, RUN)
+        bridge("custom_properties").set_run(thing, folder, RUN)
     bpy.context.view_layer.update()
     return objects
 

@@ -47,7 +47,7 @@ def blend(ops, home, tmp_path):
     bpy.context.scene.collection.children.link(top)
     wall["object_id"] = 0
     for owner in (wall, top):
-        bridge("marks").mark(owner, folder, RUN)
+        bridge("custom_properties").set_run(owner, folder, RUN)
     images = [bridge("data.images").load_image(folder / name) for name in FILES]
     bridge("results.images").settle(images, "RESULT")
     bpy.ops.wm.save_mainfile()

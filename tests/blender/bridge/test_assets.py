@@ -8,9 +8,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge.custom_properties import set_run as from_run  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.export import assets  # noqa: E402
-from addon.bridge.marks import mark as from_run  # noqa: E402
 from addon.core.brdf.material import ObjectMaterial  # noqa: E402
 from addon.core.brdf.registry import named  # noqa: E402
 

@@ -9,8 +9,8 @@ from addon.core.io.exr import read_exr, write_exr
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.corrections import refitted  # noqa: E402
+from addon.bridge.custom_properties import IMAGE  # noqa: E402
 from addon.bridge.data.images import load_image  # noqa: E402
-from addon.bridge.marks import IMAGE  # noqa: E402
 from addon.bridge.results.images import settle  # noqa: E402
 
 VALUES = {"hall": 0.25, "attic": 0.5}

@@ -88,7 +88,7 @@ def test_threads_and_memory_reach_a_run(preferences, module, ops, monkeypatch, t
 
 
 def test_results_of_two_captures_of_one_name_are_apart(preferences, module, ops, tmp_path):
-    place = module("addon.core.results.place")
+    place = module("addon.core.results.result_folders")
     one, other = ((tmp_path / where / "room") for where in ("a", "b"))
     folder = preferences.result_folder("", str(one))
     assert folder == tmp_path / "home" / "room"
@@ -108,10 +108,10 @@ def test_beside_the_file_once_it_is_saved_and_where_the_room_is(preferences, mod
     # The room came from a run before the file was saved: that one is gone on with.
     before = tmp_path / "home" / "room"
     before.mkdir(parents=True)
-    module("addon.core.results.place").write_capture(before, capture)
+    module("addon.core.results.result_folders").write_capture(before, capture)
     top = bpy.data.collections.new("Scan Relight")
     scene.collection.children.link(top)
-    module("addon.bridge.marks").mark(top, before, "a" * 16, capture)
+    module("addon.bridge.custom_properties").set_run(top, before, "a" * 16, capture)
     assert preferences.result_folder("", str(capture), scene) == before
     assert preferences.result_folder("", str(tmp_path / "other" / "room"), scene) == beside
 
@@ -136,7 +136,7 @@ def extension(package, monkeypatch, tmp_path):
 
 def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, module, ops, root, tmp_path, monkeypatch):
     """Whatever is preferred, chosen or open: nothing leads into the extension's folders."""
-    preferences, home = module("operators.preferences"), module("addon.bridge.results.home")
+    preferences, default_folders = module("operators.preferences"), module("addon.bridge.results.default_folders")
     monkeypatch.setenv("HOME", str(tmp_path / "me"))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     (tmp_path / "me" / "Documents").mkdir(parents=True)
@@ -147,7 +147,7 @@ def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, mo
         monkeypatch.setattr(preferences, "preferences", lambda chosen=chosen: chosen)
         assert preferences.results_folder() == documents
         assert preferences.result_folder("", str(tmp_path / "room")) == documents / "room"
-        assert home.capture_folder(preferences.results_folder(), "").is_relative_to(documents)
+        assert default_folders.capture_folder(preferences.results_folder(), "").is_relative_to(documents)
     (user / "cache" / "room").mkdir(parents=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(user / "cache" / "room" / "scene.blend"))
     assert preferences.result_folder("", str(tmp_path / "room"), bpy.context.scene) == documents / "room"

@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 
+from addon.bridge.custom_properties import OBJECT_ID
 from addon.bridge.data.arrays import make_mesh
 from addon.bridge.data.materials import make_material
-from addon.bridge.marks import OBJECT_ID
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.material import ObjectMaterial

@@ -11,7 +11,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon import cli  # noqa: E402
 from addon.bridge import render_device  # noqa: E402
-from addon.bridge.marks import RESULT  # noqa: E402
+from addon.bridge.custom_properties import RESULT  # noqa: E402
 from addon.bridge.relight import before_after  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from addon.core.io.exr import read_exr  # noqa: E402

@@ -11,13 +11,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge.custom_properties import OBJECT_ID, UV_MAP  # noqa: E402
 from addon.bridge.data.arrays import make_mesh  # noqa: E402
 from addon.bridge.data.images import image_array, load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV  # noqa: E402
 from addon.bridge.export import export as exporting  # noqa: E402
 from addon.bridge.light import lamps  # noqa: E402
-from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
 from addon.core.brdf.compensation import ior_of  # noqa: E402
 from addon.core.brdf.dielectric import DIELECTRIC  # noqa: E402
 from addon.core.brdf.emitter import EMITTER  # noqa: E402

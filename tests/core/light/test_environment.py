@@ -150,7 +150,7 @@ def test_a_side_that_frames_clipped_is_one_unknown_with_the_rest_of_it():
     above, below, rest = environment.unknown_zones()
     assert above.clipped and not below.clipped and rest.clipped
     assert (above.weight[10, 4:8] == 1).all() and above.weight[8:].min() > 0 and not above.weight[:8].any()
-    assert not below.weight[5, 4:8].any() and below.told
+    assert not below.weight[5, 4:8].any() and below.measured
     assert rest.weight.sum() == rest.weight[5, 4] == 1
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.core.light.few_elements import evened, irradiance_at
+from addon.core.light.few_elements import filled_radiance, irradiance_at
 from addon.core.pipeline.unseen_surfaces import with_unseen_by_light
 from tests.core.rooms import box_sides, make_room, quad
 
@@ -37,9 +37,9 @@ def test_an_underside_sends_in_proportion_to_the_light_that_reaches_it():
     true = lit(one)
     below = (one.atlas.object_id == SHELF) & (one.atlas.normal[:, 2] < -0.9)
     field = one.field(np.where(below[:, None], np.float32(0), true))
-    found = evened(with_unseen_by_light(field, ~below, **HOW))
+    found = filled_radiance(with_unseen_by_light(field, ~below, **HOW))
     assert np.array_equal(found[~below], true[~below])
-    as_its_top = np.median(evened(field)[below] / true[below])
+    as_its_top = np.median(filled_radiance(field)[below] / true[below])
     assert as_its_top > 3  # what it would be without
     assert abs(np.median(found[below] / true[below]) - 1) < 0.3
 
@@ -48,10 +48,10 @@ def test_what_was_seen_whole_or_not_at_all_stays_as_it_is():
     one = room()
     true = lit(one)
     field = one.field(true)
-    assert np.array_equal(evened(with_unseen_by_light(field, np.ones(len(true), bool), **HOW)), true)
+    assert np.array_equal(filled_radiance(with_unseen_by_light(field, np.ones(len(true), bool), **HOW)), true)
     unseen = one.atlas.object_id == SHELF
     field = one.field(np.where(unseen[:, None], np.float32(0), true))
-    assert not evened(with_unseen_by_light(field, ~unseen, **HOW))[unseen].any()
+    assert not filled_radiance(with_unseen_by_light(field, ~unseen, **HOW))[unseen].any()
 
 
 def test_the_unseen_side_of_a_lamp_shines_as_its_seen_side():
@@ -60,5 +60,5 @@ def test_the_unseen_side_of_a_lamp_shines_as_its_seen_side():
     half = (one.atlas.object_id == LAMP) & (one.atlas.position[:, 0] > LAMP_AT[0] + 0.25)
     below = (one.atlas.object_id == SHELF) & (one.atlas.normal[:, 2] < -0.9)
     field = one.field(np.where((half | below)[:, None], np.float32(0), true))
-    found = evened(with_unseen_by_light(field, ~half & ~below, **HOW))
+    found = filled_radiance(with_unseen_by_light(field, ~half & ~below, **HOW))
     assert half.any() and np.allclose(found[half], 30)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError
+from addon.core.scene.lens_json import lens_from_json, lens_to_json
 from addon.core.scene.lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
 from addon.core.scene.lenses_colmap import COUNTS, intrinsics, polynomial
-from addon.core.scene.lenses_told import lens_of, told_lens
 from addon.core.scene.model import Camera
 from addon.core.scene.pixel_rays import pixel_rays, widest_angle
 
@@ -243,8 +243,8 @@ def test_no_pixel_lies_beyond_the_widest_angle(name):
 
 @pytest.mark.parametrize("lens", [None, *STRONG.values()], ids=["none", *STRONG])
 def test_told_and_read_again(lens):
-    assert lens_of(json.loads(json.dumps(told_lens(lens)))) == lens
-    assert hash(lens) == hash(lens_of(told_lens(lens)))
+    assert lens_from_json(json.loads(json.dumps(lens_to_json(lens)))) == lens
+    assert hash(lens) == hash(lens_from_json(lens_to_json(lens)))
 
 
 @pytest.mark.parametrize(("name", "values", "wrong"), [

@@ -82,45 +82,45 @@ class _Grid:
     A normal's squared components are what each side counts there; they sum to 1.
     """
 
-    def __init__(self, position: np.ndarray, normal: np.ndarray, some: np.ndarray, reach: float, texel: float):
+    def __init__(self, position: np.ndarray, normal: np.ndarray, sample: np.ndarray, reach: float, texel: float):
         low, high = position.min(0), position.max(0)
         cell = max(reach / 3, 2 * texel, 1e-9)
         while np.prod((high - low) / cell + 1.5) > BIAS.cells:
             cell *= 1.2
-        self.place = (position - low) / cell
-        self.shape = tuple(np.floor(self.place.max(0) + 0.5).astype(int) + 1)
+        self.coordinates = (position - low) / cell
+        self.shape = tuple(np.floor(self.coordinates.max(0) + 0.5).astype(int) + 1)
         self.sides = np.concatenate([np.square(np.maximum(normal, 0)), np.square(np.minimum(normal, 0))], 1)
-        self.some = some
+        self.sample = sample
         self.sigma = max(reach / cell, 1.0)
-        self.every = np.ravel_multi_index(np.floor(self.place + 0.5).astype(int).T, self.shape)
-        self.cell = self.every[some]
+        self.cell_of = np.ravel_multi_index(np.floor(self.coordinates + 0.5).astype(int).T, self.shape)
+        self.sample_cell = self.cell_of[sample]
         self.facing = self.sides.argmax(1)
 
     def smooth(self, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Weighted Gaussian mean of values ((s, 3)) of `some`, (sides, 3, *shape), drawn towards 0."""
+        """Weighted Gaussian mean of values ((s, 3)) of `sample`, (sides, 3, *shape), drawn towards 0."""
         summed = np.empty((FACINGS, 4, *self.shape), np.float32)
-        for side, counts in zip(summed, self.sides[self.some].T, strict=True):
+        for side, counts in zip(summed, self.sides[self.sample].T, strict=True):
             for channel, value in zip(side, (*values.T, 1), strict=True):
-                channel[:] = np.bincount(self.cell, weight * counts * value, channel.size).reshape(self.shape)
+                channel[:] = np.bincount(self.sample_cell, weight * counts * value, channel.size).reshape(self.shape)
         around = gaussian_filter(summed, (0, 0, *[self.sigma] * 3), mode="constant", truncate=3)
         return around[:, :3] / (around[:, 3:] + max(BIAS.prior * float(around[:, 3].max()), 1e-30))
 
-    def at(self, field: np.ndarray, some: np.ndarray | slice = slice(None)) -> np.ndarray:
+    def at(self, field: np.ndarray, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
         """A field's values at the elements, (m, 3)."""
-        place, sides = self.place[some], self.sides[some]
-        result = np.zeros((len(place), 3), np.float32)
+        coordinates, sides = self.coordinates[elements], self.sides[elements]
+        result = np.zeros((len(coordinates), 3), np.float32)
         for side in range(FACINGS):
-            there = np.flatnonzero(sides[:, side] > 1e-3)
-            for channel in range(3 if len(there) else 0):
-                value = map_coordinates(field[side, channel], place[there].T, order=1, mode="nearest")
-                result[there, channel] += sides[there, side] * value
+            facing = np.flatnonzero(sides[:, side] > 1e-3)
+            for channel in range(3 if len(facing) else 0):
+                value = map_coordinates(field[side, channel], coordinates[facing].T, order=1, mode="nearest")
+                result[facing, channel] += sides[facing, side] * value
         return result
 
     def variation(self, colour: np.ndarray) -> float:
         """Total variation of the cells' mean log colour, of (m, 3) of all elements by the side they mostly face."""
         size = int(np.prod(self.shape))
-        place = size * self.facing + self.every
-        count = np.bincount(place, minlength=FACINGS * size)
+        index = size * self.facing + self.cell_of
+        count = np.bincount(index, minlength=FACINGS * size)
         with np.errstate(invalid="ignore"):
-            mean = (np.bincount(place, colour.mean(1), FACINGS * size) / count).reshape(FACINGS, *self.shape)
+            mean = (np.bincount(index, colour.mean(1), FACINGS * size) / count).reshape(FACINGS, *self.shape)
         return float(sum(np.nansum(np.abs(np.diff(mean, axis=axis))) for axis in (1, 2, 3)))

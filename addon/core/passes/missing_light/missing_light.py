@@ -12,7 +12,7 @@ import numpy as np
 from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import evened, from_sun, irradiance_at, spread_over
+from ...light.few_elements import filled_radiance, from_sun, irradiance_at, spread_over
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
@@ -79,7 +79,7 @@ def find_missing_light(
         `Openings.windows`.
     """
     atlas, windows = field.atlas, np.zeros(CELLS, bool) if windows is None else windows
-    radiance = evened(field)
+    radiance = filled_radiance(field)
     masks = {patch: atlas.object_id == patch for patch in patches}
     bound = {patch: np.median(radiance[mask], 0).astype(np.float64) for patch, mask in masks.items()}
     shut = unseen_closing(field)

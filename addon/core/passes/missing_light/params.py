@@ -34,7 +34,7 @@ class MissingLightParams:
         Difference of log albedo from which on two elements count as of two paints (Cauchy's scale). Seven phone-made
         rooms, in four of them two seeds: .07 gains .15 +- .13 dB over .1, .05 .28 +- .12, .035 .30 +- .14.
     level : float
-        Weight of the prior on log albedo, normal about `USUAL_ALBEDO` with the deviation `deviation`.
+        Weight of the prior on log albedo, normal about `TYPICAL_ALBEDO` with the deviation `deviation`.
     deviation : float
     highest : float
         The greatest albedo of usual paint. What is above it counts in tenths of log albedo, by the square up to

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ...brdf.lambertian import USUAL_ALBEDO
+from ...brdf.lambertian import TYPICAL_ALBEDO
 from ...scene.params import COPLANAR
 from ...significance import LEVELS
 from .params import MISSING
@@ -80,7 +80,7 @@ class _NegativeLogPosterior:
         grad_a = (
             self._difference_transposed @ (difference / (1 + difference**2)) / (MISSING.apart * max(len(difference), 1))
         )
-        offset = (a.mean(1) - np.log(USUAL_ALBEDO)) / MISSING.deviation
+        offset = (a.mean(1) - np.log(TYPICAL_ALBEDO)) / MISSING.deviation
         value += MISSING.level * 0.5 * float((offset**2).mean())
         grad_a += (MISSING.level / (MISSING.deviation * channels * m) * offset)[:, None]
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.

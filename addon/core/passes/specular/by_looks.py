@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...brdf.dielectric import DIELECTRIC, MOST_F0, USUAL_F0
+from ...brdf.dielectric import DIELECTRIC, MAX_F0, TYPICAL_F0
 from ...brdf.metal import METAL
 from ...fit.lobe_fit import LobeFit
 from ...fit.params import LOBE_FIT
@@ -29,7 +29,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
         return choice
     # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None reflects more than it
     # receives, but for the light's error: a white bowl under a lamp had 2.1.
-    if not MOST_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
+    if not MAX_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
     fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.metal, looks.diffuse)
     if looks.sigmas < LEVELS.sigmas:
@@ -51,7 +51,7 @@ def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
         or looks.sigmas < LEVELS.sigmas
     ):
         return choice
-    fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.diffuse)
+    fit = _fit(looks.phi, np.full(3, TYPICAL_F0), looks.coated, looks.diffuse)
     note = (
         f"Its radiance spreads by {looks.coated:.2f} about that of one colour under a coat, by {looks.diffuse:.2f} "
         "about a diffuse one's."

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...brdf.dielectric import DIELECTRIC, MOST_F0, SATIN
+from ...brdf.dielectric import DIELECTRIC, MAX_F0, SATIN
 from ...brdf.ggx import GGX
 from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
@@ -67,7 +67,7 @@ def _problem(
 def _model(given: Given, problem: Problem | None, enough: bool) -> Brdf:
     """The model of an object whose roughness or F0 is given."""
     if given.f0 is not None:
-        return METAL if np.mean(given.f0) > MOST_F0 else DIELECTRIC
+        return METAL if np.mean(given.f0) > MAX_F0 else DIELECTRIC
     chosen = choose_model(problem).model if enough and problem is not None else DIELECTRIC
     return chosen if chosen.has_lobe else DIELECTRIC
 
@@ -82,7 +82,7 @@ def _fit(
             return fit_lobe(dense, constraints=replace(model.constraints, least_psi=0.0, prior=None), psi=f0)
         if model.has_diffuse:
             fit = fit_lobe(dense, constraints=model.constraints)
-            return replace(fit, psi=np.minimum(fit.psi, MOST_F0))
+            return replace(fit, psi=np.minimum(fit.psi, MAX_F0))
         fit = metal_fit(problem, dense)
         return replace(fit, psi=metal_f0(problem, fit.phi))
     looks = None

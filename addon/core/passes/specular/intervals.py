@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...brdf.dielectric import MOST_F0
+from ...brdf.dielectric import MAX_F0
 from ...brdf.material import Z90
 from ...brdf.model import Brdf
 from ...fit.lobe_fit import fit_lobe
@@ -29,7 +29,7 @@ class GlossInterval:
     specular: tuple[float, float]
 
 
-UNKNOWN = GlossInterval((0.0, 1.0), (0.0, MOST_F0))
+UNKNOWN = GlossInterval((0.0, 1.0), (0.0, MAX_F0))
 """Any roughness, and any dielectric's reflectance."""
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...brdf.dielectric import DIELECTRIC, MOST_F0
+from ...brdf.dielectric import DIELECTRIC, MAX_F0
 from ...brdf.lambertian import LAMBERTIAN
 from ...brdf.metal import METAL
 from ...brdf.model import Brdf
@@ -80,12 +80,12 @@ def _weighted(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
 
 def _is_dielectric(fit: LobeFit) -> bool:
     """Whether a dielectric can have this lobe, and it can be distinguished from a diffuse part."""
-    return fit.psi[0] <= MOST_F0 and fit.phi <= FIT.broadest_phi
+    return fit.psi[0] <= MAX_F0 and fit.phi <= FIT.broadest_phi
 
 
 def _is_metallic(fit: LobeFit) -> bool:
     """Whether this lobe is too strong for a dielectric, and can be distinguished from a diffuse part."""
-    return float(fit.psi.mean()) > MOST_F0 and fit.phi <= FIT.broadest_phi
+    return float(fit.psi.mean()) > MAX_F0 and fit.phi <= FIT.broadest_phi
 
 
 def _bare_metal(
@@ -154,7 +154,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
     sure = enough and fit.phi <= FIT.broadest_phi
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
-    dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
+    dielectric = replace(fit, psi=np.minimum(fit.psi, MAX_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
     if not part and _is_metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...brdf.dielectric import USUAL_F0
+from ...brdf.dielectric import TYPICAL_F0
 from ...fit.lobe_fit import robust_scale
 from ...fit.problem import Problem
 from ...luminance import LUMINANCE
@@ -157,7 +157,7 @@ def _usable(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _coat(problem: Problem, at: int) -> np.ndarray:
     """Radiance (m, 3) of a dielectric's lobe, of the width at index `at` of the grid."""
-    return USUAL_F0 * problem.light.A[:, at] + problem.light.B[:, at]
+    return TYPICAL_F0 * problem.light.A[:, at] + problem.light.B[:, at]
 
 
 def _one_colour(radiance: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ class Sky:
         Radiance of the seen neighbours; of a clipped part the lower bound.
     clipped : list of bool
         Of what frames saw of a part only a lower bound is known.
-    told : list of bool
+    measured : list of bool
         Whether frames tell radiance on a part's side of the horizon.
     radiance : list of (3,) float64
     solved : set of int
@@ -34,7 +34,7 @@ class Sky:
     contribution: list[np.ndarray]
     guess: list[np.ndarray]
     clipped: list[bool]
-    told: list[bool]
+    measured: list[bool]
     radiance: list[np.ndarray] = field(default_factory=list)
     solved: set[int] = field(default_factory=set)
 
@@ -46,12 +46,14 @@ class Sky:
         guess = np.maximum(self.guess[i], 1e-12)
         if self.clipped[i]:
             return guess, SKY.above * guess
-        return guess / (UNSEEN.darker if self.told[i] else LIGHT_FIT.reach), np.full(3, LIGHT_FIT.reach * guess.max())
+        return guess / (UNSEEN.darker if self.measured[i] else LIGHT_FIT.reach), np.full(
+            3, LIGHT_FIT.reach * guess.max()
+        )
 
     def without(self, parts: Collection[int]) -> Sky:
         """The other parts, at the radiance that they have."""
         others = [i for i in range(len(self.contribution)) if i not in parts]
-        lists = (self.contribution, self.radiance, self.clipped, self.told)
+        lists = (self.contribution, self.radiance, self.clipped, self.measured)
         return Sky(*([values[i] for i in others] for values in lists))  # type: ignore[arg-type]
 
     def notes(self) -> list[str]:

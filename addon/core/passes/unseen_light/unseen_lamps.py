@@ -12,7 +12,7 @@ from .params import UNSEEN
 from .sky import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, kinds: LampKinds, kin, seen, sky: Sky, base) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, floor, kinds: LampKinds, kin, seen, sky: Sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
 
     A small lamp lights too little of a room to gain much. So of objects whose class shines (`kin`, with its luminance)
@@ -20,14 +20,14 @@ def solve_lamps(sample: Sample, contribution, least, kinds: LampKinds, kin, seen
     """
     sent = sample.radiance @ LUMINANCE
     gain = {i: 0.0 if i in kin else UNSEEN.lamp_gain for i in contribution}
-    least = {i: max(bound, kin.get(i, 0.0) / LIGHT_FIT.reach) for i, bound in least.items()}
+    floor = {i: max(bound, kin.get(i, 0.0) / LIGHT_FIT.reach) for i, bound in floor.items()}
     lamps: list[Lamp] = []
     remaining = dict(contribution)
     while remaining:
         light = all_light(base, lamps, contribution, sky)
         received = light @ LUMINANCE
         best = {i: sample.best(sent, received, G) for i, G in remaining.items()}
-        improving = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > least[i]}
+        improving = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > floor[i]}
         if not improving:
             break
         object_id = min(improving, key=lambda i: improving[i][2])
@@ -47,7 +47,7 @@ def needed(
     sure = [lamp for lamp in lamps if lamp.object_id in shining]
     if not sky.contribution or len(sure) == len(lamps):
         return lamps, sky
-    alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
+    alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.measured)
     for _ in range(UNSEEN.sweeps):
         solve_sky(sample, sure, contribution, alone, base)
     sent = log_of(sample.radiance @ LUMINANCE)
@@ -58,16 +58,16 @@ def needed(
     return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (sure, alone)
 
 
-def twin(object_id: int, least: float, sample: Sample, sent, received, contribution, model, seen) -> Lamp | None:
+def twin(object_id: int, min_spread: float, sample: Sample, sent, received, contribution, model, seen) -> Lamp | None:
     """The seen lamp of the object's model that explains best what is sent, if it does nearly as well as any radiance.
 
-    Lamps of one model mostly shine alike; that one differs is believed as any lamp is, by `lamp_gain` of the `least`
+    Lamps of one model mostly shine alike; that one differs is believed as any lamp is, by `lamp_gain` of the least
     spread of log albedo.
     """
     alike = [lamp for lamp in seen if model.get(lamp.object_id) == model.get(object_id)]
     log_sent, luminance = log_of(sent), [float(lamp.radiance @ LUMINANCE) for lamp in alike]
     spread = [sample.spread_under(log_sent, received + s * contribution) for s in luminance]
-    if not alike or least < (1 - UNSEEN.lamp_gain) * min(spread):
+    if not alike or min_spread < (1 - UNSEEN.lamp_gain) * min(spread):
         return None
     return alike[int(np.argmin(spread))]
 

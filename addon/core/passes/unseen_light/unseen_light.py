@@ -12,7 +12,7 @@ import numpy as np
 
 from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
-from ...light.few_elements import barely_seen, evened, from_sun, irradiance_at, most_reflected, pick, steady
+from ...light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, most_reflected, pick, steady
 from ...light.field import LightField
 from ...light.lamps import Lamp, LampKinds, find_seen, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
@@ -39,7 +39,7 @@ class Contributions:
         Those of the sample that tell of lamps.
     lamps : dict of (k,) float64
         E there at radiance 1 from each unseen object, and from those of its model (`LampKinds`).
-    least : dict of float
+    min_luminance : dict of float
         Luminance below which each would be no lamp.
     """
 
@@ -47,7 +47,7 @@ class Contributions:
     sky: list[np.ndarray]
     element: np.ndarray
     lamps: dict[int, np.ndarray]
-    least: dict[int, float]
+    min_luminance: dict[int, float]
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    dark, evened_radiance, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
-    received = previous.received if previous else irradiance_at(unlit.with_light(evened_radiance, known), element, seed)
+    dark, room_radiance, unlit = np.zeros_like(field.radiance), filled_radiance(field), field.with_sun(None)
+    received = previous.received if previous else irradiance_at(unlit.with_light(room_radiance, known), element, seed)
     sky_contributions = (
         previous.sky
         if previous
@@ -173,19 +173,19 @@ def find_light(
         groups = {i: groups[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
     earlier = previous if previous is not None and np.array_equal(previous.element, sample.element) else None
     if earlier is not None:
-        contribution, least = earlier.lamps, earlier.least
+        contribution, min_luminance = earlier.lamps, earlier.min_luminance
     else:
         contribution = dict(
             zip(groups, contributions(field, sample.element, list(groups.values()), seed).T, strict=True)
         )
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-        lit_room = field.with_light(evened_radiance, environment)
-        least = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
+        lit_room = field.with_light(room_radiance, environment)
+        min_luminance = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
-    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
+    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
     certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, kinds, kin, seen, sky, received[lit])
+        lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received[lit])
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], certain)
     lamps = [
@@ -201,7 +201,7 @@ def find_light(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = bright_all_over(field, element, irradiance)
-    reusable = Contributions(sunless, sky_contributions, sample.element, contribution, least)
+    reusable = Contributions(sunless, sky_contributions, sample.element, contribution, min_luminance)
     notes = sky_notes + tuple(sky.notes())
     return Light(tuple(sure) + tuple(lamps), environment, notes, element, irradiance, reusable, mixed)
 
@@ -230,7 +230,7 @@ def as_shown(lamp: Lamp, field: LightField) -> Lamp:
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     """L_d with the radiance of lamps put in, and its object's where nobody saw an element, (n, 3) float32."""
-    radiance = evened(field)
+    radiance = filled_radiance(field)
     for lamp in lamps:
         radiance[field.atlas.elements_of(lamp.object_id)] = lamp.radiance
     return radiance

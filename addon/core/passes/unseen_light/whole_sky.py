@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...light.environment import Environment
-from ...light.few_elements import evened, irradiance_at
+from ...light.few_elements import filled_radiance, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
@@ -22,7 +22,7 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     contribution = irradiance_at(dark, element, seed)[:, 0]
     if contribution.mean() < SKY.least_share * np.pi:
         return field, ()
-    received = irradiance_at(field.with_light(evened(field)), element, seed)
+    received = irradiance_at(field.with_light(filled_radiance(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     usable = np.ones(len(element), bool)
     fit = None
@@ -44,11 +44,11 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     if len(solved) == 3:
         radiance = np.array(solved)
     # No object reflects more than it gets.
-    least = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
+    floor = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
         :, None
     ]
     for number in np.unique(sample.object_id):
-        radiance = np.maximum(radiance, np.median(least[object_id[usable] == number], 0))
+        radiance = np.maximum(radiance, np.median(floor[object_id[usable] == number], 0))
     note = (
         "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
         f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "

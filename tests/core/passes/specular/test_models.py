@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.brdf.dielectric import DIELECTRIC, MOST_F0
+from addon.core.brdf.dielectric import DIELECTRIC, MAX_F0
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
@@ -69,7 +69,7 @@ def test_a_metal_has_no_diffuse_part(seen):
     box = Box()
     element, direction, _ = box.views(60, 10)
     choice = choose_model(box.problem(element, direction, 0.11, COPPER / 4, 3 * paint(element)))
-    assert choice.model == DIELECTRIC and choice.fit.psi.max() <= MOST_F0
+    assert choice.model == DIELECTRIC and choice.fit.psi.max() <= MAX_F0
 
 
 def test_a_metal_under_light_that_is_off(seen):
@@ -120,7 +120,7 @@ def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
     gains = iter([(0.5, 10.0), (0.5, 10.0), (0.1, 2.5)])
     monkeypatch.setattr(models, "_gain", lambda with_lobe, without: next(gains))
     choice = choose_model(seen["metal"])
-    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= MOST_F0
+    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= MAX_F0
 
 
 def test_the_class_helps_out(seen):

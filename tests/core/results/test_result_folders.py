@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from addon.core.results.place import captures, documents, own_folder, write_capture
+from addon.core.results.result_folders import captures, documents, own_folder, write_capture
 from addon.core.results.room_file import write_room
 from addon.core.scene.model import Capture
 from tests.core.results.test_room_file import a_capture

@@ -8,8 +8,8 @@ import bpy
 
 from ...core.errors import BadInputError
 from ...core.io.folder import SCENE
-from ...core.results.place import BESIDE, HOME, captures, documents, free_folder, own_folder
-from ..marks import CAPTURE, RESULT
+from ...core.results.result_folders import DOCUMENTS_FOLDER, FOLDER_BESIDE, captures, documents, free_folder, own_folder
+from ..custom_properties import CAPTURE, RESULT
 
 PACKAGE = __package__.rsplit(".", 3)[0]
 """The root package, under whatever name Blender installed it."""
@@ -23,33 +23,33 @@ def results_folder(preferred: str = "") -> Path:
         folder = Path(bpy.path.abspath(preferred)).absolute()
         if not is_in_extension(folder):
             return folder
-    return documents() / HOME
+    return documents() / DOCUMENTS_FOLDER
 
 
-def result_folder(capture: Path, home: Path, scene: bpy.types.Scene | None = None) -> Path:
+def result_folder(capture: Path, results_root: Path, scene: bpy.types.Scene | None = None) -> Path:
     """The default result folder of a capture; it is not created here.
 
     Parameters
     ----------
     capture : Path
         Absolute.
-    home : Path
+    results_root : Path
         The return value of `results_folder`.
     scene : bpy.types.Scene, optional
         Where it has a room of this capture, that room's result folder is used.
     """
     existing = _result_of_room(scene, capture) if scene is not None else None
-    return existing or own_folder(folder_beside_file() or home, capture)
+    return existing or own_folder(folder_beside_file() or results_root, capture)
 
 
-def capture_folder(home: Path, chosen: str) -> Path:
+def capture_folder(results_root: Path, chosen: str) -> Path:
     """The folder that a capture of the open scene goes to; the previous one is `chosen` in the panel."""
     if bpy.data.filepath:
-        return (folder_beside_file() or home) / CAPTURES / Path(bpy.data.filepath).stem
+        return (folder_beside_file() or results_root) / CAPTURES / Path(bpy.data.filepath).stem
     previous = Path(bpy.path.abspath(chosen)) if chosen else None
-    if previous is not None and previous.parent == home / CAPTURES and previous.name.startswith(UNSAVED):
+    if previous is not None and previous.parent == results_root / CAPTURES and previous.name.startswith(UNSAVED):
         return previous
-    return free_folder(home / CAPTURES, UNSAVED)
+    return free_folder(results_root / CAPTURES, UNSAVED)
 
 
 def folder_beside_file() -> Path | None:
@@ -62,7 +62,7 @@ def folder_beside_file() -> Path | None:
     }  # recovered sessions
     if folder.resolve() in temporary or is_in_extension(folder) or not os.access(folder, os.W_OK):
         return None
-    return folder / BESIDE
+    return folder / FOLDER_BESIDE
 
 
 def display_path(folder: Path) -> str:

@@ -38,8 +38,8 @@ UV_MAP = "scan_relight_uv_map"
 """Of an image: name of the texture coordinates that it is laid out for; absent where those are the room atlas's."""
 
 
-def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
-    """Mark an object or a room's collection with the run that made it.
+def set_run(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
+    """Store which run made an object or a room's collection in its custom properties.
 
     Parameters
     ----------

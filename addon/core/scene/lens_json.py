@@ -12,21 +12,21 @@ _CLASSES: tuple[type[Lens], ...] = (Cropped, Division, EnhancedUnified, Equirect
 KINDS: dict[str, Callable[..., Lens]] = {kind.__name__: kind for kind in _CLASSES}
 
 
-def told_lens(lens: Lens | None) -> list[Any] | None:
+def lens_to_json(lens: Lens | None) -> list[Any] | None:
     """A lens as lists, numbers and strings; None stays None."""
     if lens is None:
         return None
     values = [getattr(lens, field.name) for field in dataclasses.fields(lens)]
-    return [type(lens).__name__, [told_lens(v) if type(v).__name__ in KINDS else v for v in values]]
+    return [type(lens).__name__, [lens_to_json(v) if type(v).__name__ in KINDS else v for v in values]]
 
 
-def lens_of(stored: list[Any] | None) -> Lens | None:
-    """The lens that `told_lens` stored. Raises KeyError, TypeError or ValueError for anything else."""
+def lens_from_json(stored: list[Any] | None) -> Lens | None:
+    """The lens that `lens_to_json` stored. Raises KeyError, TypeError or ValueError for anything else."""
     if stored is None:
         return None
     kind, values = stored
     if kind == Cropped.__name__:
-        inner = lens_of(values[0])
+        inner = lens_from_json(values[0])
         if inner is None:
             raise TypeError("a crop of no lens")
         return Cropped(inner, *values[1:])

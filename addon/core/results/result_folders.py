@@ -15,8 +15,8 @@ from .room_file import DAMAGE, root_of
 
 CAPTURE = "capture.json"
 """File of a result folder that tells which capture it is of, from the first moment of a run on."""
-HOME = "Scan Relight"
-BESIDE = "scan relight"
+DOCUMENTS_FOLDER = "Scan Relight"
+FOLDER_BESIDE = "scan relight"
 """Folders of results: among the user's documents; beside a saved .blend."""
 
 
