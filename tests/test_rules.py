@@ -263,6 +263,34 @@ def test_the_methods_numbers_are_fields_of_params():
                 assert fields == {name for names in told for name in names.split(", ")}, f"{path}: {one.name}"
 
 
+def bound_names(path: Path) -> list[tuple[str, int]]:
+    """Names of variables, parameters and functions that a module binds, and their lines; not a class's fields."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    of_fields = {
+        id(field.target)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        for field in node.body
+        if isinstance(field, ast.AnnAssign)
+    }
+    names = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and id(node) not in of_fields:
+            names.append((node.id, node.lineno))
+        elif isinstance(node, ast.arg):
+            names.append((node.arg, node.lineno))
+        elif isinstance(node, ast.FunctionDef):
+            names.append((node.name, node.lineno))
+    return names
+
+
+def test_names_say_what_they_hold():
+    vague = {"told", "thing", "things", "one", "asked", "shown", "usual", "stuff"}
+    for path in CODE:
+        for name, line in bound_names(path):
+            assert name.strip("_") not in vague, f"{relative(path)}:{line}: '{name}' could hold anything"
+
+
 def test_docstrings_have_numpys_sections():
     """What a function takes and gives stands in sections of its own, not run in with the sentences."""
     run_in = re.compile(r"\bReturns: |^\s*`\**[a-z_]+`: ", re.MULTILINE)
