@@ -227,7 +227,7 @@ def result(name: str) -> Reader:
 
     def read(root: Path) -> None:
         from addon.core.pipeline.refit import open_result
-        from addon.core.results import cache, place, room_file, unfinished
+        from addon.core.results import cache, result_folders, room_file, unfinished
         from addon.core.results.store import Store
 
         with Store(root) as store:
@@ -235,7 +235,7 @@ def result(name: str) -> Reader:
             assert found is None or all(np.array_equal(found[name], STAGE[name]) for name in STAGE)
             store.load_meta("surface", "k"), store.stored_meta("surface"), store.stored_key("surface")
         room_file.run_of(root), room_file.layout_of(root), room_file.objects_of(root), room_file.openings_of(root)
-        room_file.root_of(root), place.captures(root)
+        room_file.root_of(root), result_folders.captures(root)
         unfinished.goes_on_with(root), cache.size(root)
         room_file.read_room(root)
         open_result(root, [1])

@@ -79,7 +79,7 @@ def test_of_a_long_recording_the_sharpest_of_each_part(tmp_path, monkeypatch):
         y[:, 20:40] += 8 if i not in sharp else np.where(np.arange(20) // 2 % 2, 40, -20)
     write_video(tmp_path / "a.mp4", planes)
     assert set(frames(tmp_path / "a.mp4", np.array_split(np.arange(12), 3))) == sharp
-    monkeypatch.setattr("addon.core.io.stray.MOST", 4)
+    monkeypatch.setattr("addon.core.io.stray.MAX_FRAMES", 4)
     found = read_capture(write_recording(tmp_path / "scan", range(30, 200, 10)))
     assert len(found.frames) == 4 and any("4 of 17 frames are used" in one for one in found.warnings)
 
