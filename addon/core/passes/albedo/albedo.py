@@ -71,9 +71,9 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
 
 
 def specular_error(lit_diffuse: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
-    """Relative standard error that a difference has as its subtrahend's is `ALBEDO.specular_error`.
+    """Relative standard error of L_d less its specular part, where that part is more than what is left.
 
-    Where a highlight was most of what frames saw, little is known of what is left: burnt wood under a window's image.
+    There little is known of the rest: burnt wood under a window's image.
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ def specular_error(lit_diffuse: np.ndarray, specular: np.ndarray | float) -> np.
     """
     taken = np.maximum(np.nan_to_num(np.broadcast_to(specular, lit_diffuse.shape)), 0).sum(1)
     left = np.maximum(np.nan_to_num(lit_diffuse).sum(1) - taken, ALBEDO.floor * taken)
-    return ALBEDO.specular_error * np.divide(taken, left, out=np.zeros(len(taken), np.float32), where=left > 0)
+    ratio = np.divide(taken, left, out=np.zeros(len(taken), np.float32), where=left > 0)
+    return ALBEDO.specular_error * np.maximum(ratio - 1, 0)
 
 
 def without_emitters(atlas: Atlas, mask: np.ndarray, emitters: set[int]) -> np.ndarray:

@@ -125,9 +125,8 @@ class AlbedoParams:
     unknown, least_spread : float
         Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
     specular_error : float
-        Relative standard error of the specular part that is taken out of L_d (`specular-error` in the ablation). With
-        .2 ten rooms gain .05 dB of albedo, and burnt spots fade; with .4 two of three more, whose floors have a
-        pattern, lose .1.
+        Relative standard error of the specular part that is taken out of L_d, as far as it is more than what is left
+        (`specular-error` in the ablation). As far as it is anything, bathrooms and the living room lose .2 to .4 dB.
     """
 
     floor: float = 1e-3
