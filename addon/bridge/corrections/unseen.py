@@ -256,10 +256,8 @@ def _fill(objects, coverage_map, where, skipped) -> int:
     filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
     for obj in objects:
         elements = np.flatnonzero(atlas.object_id == index_of[obj])
-        unseen, measured = (
-            elements[observed[elements] < 0.5],
-            elements[(observed[elements] >= 0.5) & was_measured(quality[elements])],
-        )
+        unseen = elements[observed[elements] < 0.5]
+        measured = elements[(observed[elements] >= 0.5) & was_measured(quality[elements])]
         if not len(unseen) or not len(measured):
             why = "frames saw all of it" if not len(unseen) else "no spot of it was measured to fill from"
             skipped.setdefault(why, []).append(obj.name)

@@ -25,12 +25,8 @@ _LENGTHS = ("size", "size_y", "shadow_soft_size")
 
 def setup_of(scene: bpy.types.Scene) -> str:
     """The light of a scene as JSON; raises `BadInputError` where it has no room."""
-    to_frame, size, light, world = (
-        _camera_frame(scene).inverted(),
-        _room_diagonal(scene),
-        room_light(scene),
-        scene.world,
-    )
+    to_frame, size = _camera_frame(scene).inverted(), _room_diagonal(scene)
+    light, world = room_light(scene), scene.world
     lights = []
     for obj in added_lights(scene):
         data = obj.data

@@ -80,11 +80,8 @@ def _parts(root: Path) -> tuple[Path, Path] | None:
 
 def _camera(metadata: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> Camera:
     """The frame's own camera, else that of the whole recording (`K`, column by column)."""
-    size, per_frame, shared = (
-        [metadata.get("w"), metadata.get("h")],
-        metadata.get("perFrameIntrinsicCoeffs"),
-        metadata.get("K"),
-    )
+    size = [metadata.get("w"), metadata.get("h")]
+    per_frame, shared = metadata.get("perFrameIntrinsicCoeffs"), metadata.get("K")
     values: Any = per_frame[index] if isinstance(per_frame, list) and index < len(per_frame) else None
     if values is None and isinstance(shared, list) and len(shared) == 9:
         values = [shared[k] for k in (0, 4, 6, 7)]

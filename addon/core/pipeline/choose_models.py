@@ -122,11 +122,8 @@ def look_at(
     known : mapping of int to Looked, optional
         What was found of them before.
     """
-    guesses, known, given = (
-        {instance.object_id for instance in room.instances if instance.guess},
-        known or {},
-        room.given,
-    )
+    guesses = {instance.object_id for instance in room.instances if instance.guess}
+    known, given = known or {}, room.given
 
     def look(object_id: int) -> Looked:
         if object_id in known:

@@ -128,10 +128,8 @@ class FrameReader:
 
 def check_disk_space(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
     """Raise `StorageError` where what `Exact` keeps, estimated from some of the frames, does not fit on the disk."""
-    sampled_frames, points = (
-        frames[:: -(-len(frames) // SAMPLED[0])],
-        surface.atlas.position[:: -(-len(surface.atlas) // SAMPLED[1])],
-    )
+    sampled_frames = frames[:: -(-len(frames) // SAMPLED[0])]
+    points = surface.atlas.position[:: -(-len(surface.atlas) // SAMPLED[1])]
     seen = sum(len(sees(frame.camera, points, surface.scene)[0]) for frame in sampled_frames)
     observations = seen / (len(sampled_frames) * len(points)) * len(frames) * len(surface.atlas)
     need, free = int(observations) * Exact.RECORD.itemsize, shutil.disk_usage(folder).free

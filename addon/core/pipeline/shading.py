@@ -63,14 +63,8 @@ def find_shading(
     def mirrors(field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
         mirrors_found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed)
         known = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
-        return (
-            *mirrors_found,
-            *(
-                candidate
-                for candidate in known
-                if candidate.object_id not in {mirror.object_id for mirror in mirrors_found}
-            ),
-        )
+        ids = {mirror.object_id for mirror in mirrors_found}
+        return (*mirrors_found, *(mirror for mirror in known if mirror.object_id not in ids))
 
     lit_diffuse = observed.lit_diffuse
     if "shading" in s.published:

@@ -267,12 +267,8 @@ def _copy_same_materials(by_id: dict[int, ObjectMaterial], given: Mapping[int, G
 
 def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, pictures: Pictures) -> np.ndarray:
     """Put the specular part of glossy things' L_d into `specular`, (n, 3); where it hides the rest, (n,) bool."""
-    glossy, field, samples, settings = (
-        [m for m in materials if m.model.layered],
-        room.field,
-        room.samples,
-        room.settings,
-    )
+    glossy = [m for m in materials if m.model.layered]
+    field, samples, settings = room.field, room.samples, room.settings
     glossy_mask = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
     frames_showing = np.unique(samples.frame[glossy_mask[samples.element]])
     if not len(frames_showing):

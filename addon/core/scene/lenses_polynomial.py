@@ -284,14 +284,7 @@ def _bracketed(function: Callable, target: np.ndarray, r: np.ndarray, low: np.nd
         todo = np.abs(residual) > goal[active]
         if not todo.any():
             break
-        active, r, residual, slope, low, high = (
-            active[todo],
-            r[todo],
-            residual[todo],
-            slope[todo],
-            low[todo],
-            high[todo],
-        )
+        active, r, residual, slope, low, high = (x[todo] for x in (active, r, residual, slope, low, high))
         low, high = np.where(residual < 0, r, low), np.where(residual > 0, r, high)
         step = r - residual / np.maximum(slope, 1e-300)
         r = np.where((step > low) & (step < high), step, (low + high) / 2)

@@ -71,9 +71,9 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
 
 
 def specular_error(lit_diffuse: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
-    """Relative standard error of L_d less its specular part, where that part is more than what is left.
+    """Relative standard error of L_d less its specular part: `ALBEDO.specular_error` max(specular / rest - 1, 0).
 
-    There little is known of the rest: burnt wood under a window's image.
+    Where the specular part is more than the rest, little is known of that: burnt wood under a window's image.
 
     Parameters
     ----------

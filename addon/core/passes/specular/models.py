@@ -160,10 +160,8 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be distinguished from that, too.
-        (metal_gain, metal_sigmas), (gain_over_dielectric, sigmas_over_dielectric) = (
-            _gain(with_metal, diffuse),
-            _gain(with_metal, with_lobe),
-        )
+        metal_gain, metal_sigmas = _gain(with_metal, diffuse)
+        gain_over_dielectric, sigmas_over_dielectric = _gain(with_metal, with_lobe)
         bare_cost = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
         if min(metal_gain, gain_over_dielectric) > CHOICE.min_gain and bare_cost <= CHOICE.bare * diffuse.sum():
             if metal_sigmas > LEVELS.sigmas and sigmas_over_dielectric > LEVELS.likely:
