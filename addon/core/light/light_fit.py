@@ -51,11 +51,13 @@ class Sample:
         count = np.bincount(self.group)
         self._middle = np.cumsum(count) - count + (count - 1) // 2
 
+    def medians(self, values: np.ndarray) -> np.ndarray:
+        """For each element the median of `values` ((m,)) over its object, the lower of two in the middle, (m,)."""
+        return values[np.lexsort((values, self.group))[self._middle]][self.group]
+
     def spread(self, log_albedo: np.ndarray) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at a cap."""
-        # A value each, the lower of two in the middle.
-        medians = log_albedo[np.lexsort((log_albedo, self.group))[self._middle]]
-        return float(np.minimum(np.abs(log_albedo - medians[self.group]), LIGHT_FIT.cap).mean())
+        return float(np.minimum(np.abs(log_albedo - self.medians(log_albedo)), LIGHT_FIT.cap).mean())
 
     def spread_under(self, log_sent: np.ndarray, received: np.ndarray) -> float:
         """The spread of log albedo under an E, (m,), of the logarithm of what is sent, (m,) (`log_of`)."""

@@ -17,12 +17,13 @@ def find_all_light(
     good: np.ndarray,
     unseen_objects: list[int],
     kinds: LampKinds,
+    clipped: np.ndarray,
     seed: int = 0,
     tilted: np.ndarray | None = None,
     shining: Collection[int] = (),
     without: Collection[str] = (),
 ) -> tuple[Light, Sun | None]:
-    """`find_light`, and the sun; parameters are those of `find_light`.
+    """`find_light`, and the sun; parameters are those of `find_light`, and the elements that are `clipped` ((n,) bool).
 
     A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
     sun keeps it.
@@ -33,9 +34,13 @@ def find_all_light(
         return light, field.sun
     lamps = [lamp.object_id for lamp in light.lamps]
     lit_field = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
+    object_id = field.atlas.object_id
+    unlit = ~np.isin(object_id, lamps)
+    free = unlit[light.element]
     sun_fit = find_sun(
-        field, light.element, light.received, lamps, good, lambda element: irradiance_at(lit_field, element, seed), seed
-    )
+        field, light.element[free], light.received[free], good & unlit,
+        lambda element: irradiance_at(lit_field, element, seed), object_id, clipped, seed,
+    )  # fmt: skip
     if sun_fit is None:
         return light, None
     lit_by_sun = field.with_sun(sun_fit.sun)
@@ -44,4 +49,4 @@ def find_all_light(
         return light_with_sun, sun_fit.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is solved for again beside them.
     others = light_with_sun.received - from_sun(field.with_sun(sun_fit.sun), light.element)
-    return light_with_sun, sun_fit.under(light.element, np.maximum(others, 0) / np.maximum(light.received, 1e-12))
+    return light_with_sun, sun_fit.under((np.maximum(others, 0) / np.maximum(light.received, 1e-12))[free])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import barely_seen, filled_radiance
+from ..light.few_elements import barely_seen, filled_radiance, irradiance_at, spread_over
 from ..light.field import LightField
 from ..light.lamps import Lamp, LampKinds, lamp_kinds
 from ..light.mirrors import Mirror, known_mirror
@@ -23,7 +23,8 @@ from ..passes.clipped_lamps.patches import clipped_patches, measured_patches
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
-from ..passes.sun.sun_patch import find_patch_sun
+from ..passes.sun.params import SUN
+from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
@@ -72,7 +73,8 @@ def find_shading(
             surface.mesh, surface.atlas, surface.scene, lit_diffuse, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    patches, parts_guessed = Patches.none(), capture.mesh.whole
+    patches, parts_guessed, whole = Patches.none(), capture.mesh.whole, surface.atlas.object_id
+    cameras = [frame.camera for frame in capture.frames]
     if parts_guessed and not {"clipped-patches", "missing-light"} & set(s.without):
         patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit_diffuse)
         surface = patches.surface(surface)
@@ -93,7 +95,7 @@ def find_shading(
         return shade(
             surface, capture.instances, lit_diffuse, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, shining=shining,
-            patches=patches.lamps if parts_guessed else None, cameras=[frame.camera for frame in capture.frames],
+            patches=patches.lamps if parts_guessed else None, whole=whole, cameras=cameras,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -139,6 +141,7 @@ def shade(
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
     shining: Collection[int] = (),
     patches: list[int] | None = None,
+    whole: np.ndarray | None = None,
     cameras: Sequence[Camera] = (),
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
@@ -152,6 +155,8 @@ def shade(
         Objects that frames show clipped, of which `lit_diffuse` holds nothing.
     patches : list of int, optional
         Objects that were set apart as they were clipped; None where the capture names its objects.
+    whole : (n,) int, optional
+        The object of each element before any were set apart.
     cameras : sequence of Camera
         Of the frames.
 
@@ -182,7 +187,10 @@ def shade(
     field, light = with_all_light(dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
-        field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, cameras, without, seed)
+        whole = atlas.object_id if whole is None else whole
+        field, light, solved = with_missing_light(
+            dark, field, light, lit_diffuse, patches, whole, cameras, without, seed
+        )
     del dark
 
     # Where there is no L_d to divide, the rough E does.
@@ -248,7 +256,8 @@ def with_all_light(
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
-    light, sun = find_all_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
+    clipped = lit_diffuse.clipped > 0.5
+    light, sun = find_all_light(field, good, unseen, kinds, clipped, seed, tilted, shining, without=without)
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:
@@ -265,6 +274,7 @@ def with_missing_light(
     light: Light,
     lit_diffuse: LitDiffuse,
     patches: list[int],
+    whole: np.ndarray,
     cameras: Sequence[Camera],
     without: Collection[str],
     seed: int,
@@ -279,6 +289,8 @@ def with_missing_light(
         As the frames show it, without lamps, dark where no frame saw it.
     field : LightField
         With all `light` that was found otherwise.
+    whole : (n,) int
+        The object of each element before `patches` were set apart.
     """
     good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
     if not is_missing(field, good, seed):
@@ -295,10 +307,14 @@ def with_missing_light(
     lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
     if "sun" in without or dark.sun is not None:
         return lit_field, light_found, missing.shut
-    sun = find_patch_sun(dark, lit_field, lit_diffuse, patches, seed)
-    if sun is None:
+    element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
+    solved = find_sun(
+        dark, element, irradiance_at(lit_field, element, seed), lit_diffuse.seen,
+        lambda element: irradiance_at(lit_field, element, seed), whole, lit_diffuse.clipped > 0.5, seed,
+    )  # fmt: skip
+    if solved is None:
         return lit_field, light_found, missing.shut
-    dark, reflecting = dark.with_sun(sun), reflecting.with_sun(sun)
+    dark, reflecting = dark.with_sun(solved.sun), reflecting.with_sun(solved.sun)
     missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
     return *with_found_light(dark, field, light, lit_diffuse, missing, measured), missing.shut
 

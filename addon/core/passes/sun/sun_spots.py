@@ -1,17 +1,22 @@
-"""Elements near a patch of light, and how well a sun explains them: by the objects' albedo, and along the edges."""
+"""Elements near a patch of light, and how well a sun explains what lies along its edges."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.stats import CensoredData, ecdf
 
 from ...light.field import LightField
 from ...light.light_fit import Sample
-from ...light.params import LESS_NOISE, LIGHT_FIT
+from ...light.params import LIGHT_FIT
 from ...light.sun import Sun, shadow
 from ...luminance import LUMINANCE
 from ...scene.rays import RayScene
+from ...significance import LEVELS
 from .params import SUN
+
+RADII = np.radians([0.27, 0.5, 0.75, 1.0])
+"""Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
 
 
 def visible(scene: RayScene, direction: np.ndarray, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -32,9 +37,11 @@ class Guess:
     ----------
     direction : (3,) float32
     cost : float
-        What is left of the quantity that was minimised.
+        Of what is minimised.
     strength : float
         Irradiance, luminance.
+    radius : float
+        Of the disc, radians.
     """
 
     direction: np.ndarray
@@ -51,20 +58,30 @@ class Spots:
     element : (m,) int
     received : (m, 3) float64
         E there, without the sun.
+    object_id, clipped : (n,) int, (n,) bool
+        Of all elements of the room: the object; whether the radiance is a lower bound.
     """
 
-    def __init__(self, field: LightField, element: np.ndarray, received: np.ndarray):
+    def __init__(
+        self, field: LightField, element: np.ndarray, received: np.ndarray, object_id: np.ndarray, clipped: np.ndarray
+    ):
         atlas = field.atlas
-        self.scene, self.atlas = field.scene, atlas
+        self.scene = field.scene
         self.position, self.normal = atlas.position[element], atlas.normal[element]
-        self.sample = Sample(element, atlas.object_id[element], field.radiance[element].astype(np.float64), received)
+        self.sample = Sample(element, object_id[element], field.radiance[element].astype(np.float64), received)
+        self.clipped = clipped[element]
         self.edge = atlas.texel_edge
+
+    @property
+    def place(self) -> np.ndarray:
+        """A key, (m, 7): the distance between two is that of elements of one object; others are far apart."""
+        return np.concatenate([self.position, 0.2 * self.normal, 100.0 * self.sample.object_id[:, None]], 1)
 
     def __len__(self) -> int:
         return len(self.position)
 
     def log_albedo(
-        self, contribution: np.ndarray | float = 0.0, strength: float = 0.0, weights=LUMINANCE
+        self, contribution: np.ndarray | float = 0.0, strength: float = 0.0, weights: np.ndarray = LUMINANCE
     ) -> np.ndarray:
         """Of the channel that `weights` make, with a sun, (m,)."""
         sent = np.pi * (self.sample.radiance @ weights)
@@ -78,7 +95,7 @@ class Spots:
     def stands_out(self) -> np.ndarray:
         """Those, and what is much brighter than the rest of its object, (m,) bool."""
         value = self.log_albedo()
-        return self.over() | (value - self.medians(value, np.ones(len(self), bool)) > SUN.stands_out)
+        return self.over() | (value - self.sample.medians(value) > SUN.stands_out)
 
     def contribution(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
         """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
@@ -86,50 +103,64 @@ class Spots:
             return shadow(self.scene, Sun(direction, np.ones(3), radius), self.position, self.normal, self.edge, 0)[0]
         return visible(self.scene, direction, self.position, self.normal)
 
-    def medians(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """For each element the median of `values` over the chosen ones of its object, (m,); NaN where none is."""
-        group = self.sample.group
-        order = np.flatnonzero(chosen)[np.lexsort((values[chosen], group[chosen]))]
-        count = np.bincount(group[chosen], minlength=int(group.max(initial=0)) + 1)
-        median = np.full(len(count), np.nan)
-        start = np.concatenate([[0], np.cumsum(count)[:-1]])
-        median[count > 0] = values[order[(start + count // 2)[count > 0]]]
-        return median[group]
-
-    def strength(self, contribution: np.ndarray, weights=LUMINANCE) -> float:
-        """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
-        lit = contribution > 0
-        rho = np.exp(self.medians(self.log_albedo(weights=weights), contribution <= 0))
-        use = lit & np.isfinite(rho)
-        if use.sum() < 3:
-            return 0.0
-        sent, received = np.pi * (self.sample.radiance @ weights), self.sample.received @ weights
-        return max(float(np.median((sent[use] / rho[use] - received[use]) / contribution[use])), 0.0)
-
-    def spread(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        return self.sample.spread(self.log_albedo(contribution, strength))
-
-    def explained(self, direction: np.ndarray) -> Guess:
-        """The direction with its strength and the spread that it leaves."""
-        contribution = self.contribution(direction)
-        strength = self.strength(contribution)
-        return Guess(direction, self.spread(contribution, strength), strength)
-
 
 class Edges:
-    """Neighbours on the same object along the edges of a patch: light and shade that are right leave them alike."""
+    """Neighbours on the same object along the edges of a patch: light and shade that are right leave them alike.
+
+    Of a clipped element only a lower bound of its albedo is known: it may be as much brighter as the light asks for.
+    """
 
     def __init__(self, spots: Spots):
         self.spots = spots
-        key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-        distance, neighbour = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=LESS_NOISE.cell)
+        place = spots.place
+        distance, neighbour = cKDTree(place).query(place, k=min(9, len(place)), distance_upper_bound=SUN.near)
         self.a, k = np.nonzero(np.isfinite(distance[:, 1:]))
         self.b = neighbour[:, 1:][self.a, k]
 
     def differ(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        """Mean difference of log albedo between neighbours, each held at `COARSE`."""
-        value = self.spots.log_albedo(contribution, strength)
-        return float(np.minimum(np.abs(value[self.a] - value[self.b]), LIGHT_FIT.cap).mean()) if len(self.a) else 0.0
+        """Mean difference of log albedo between neighbours, each held at the cap."""
+        value, clipped = self.spots.log_albedo(contribution, strength), self.spots.clipped
+        difference = value[self.a] - value[self.b]
+        difference[(clipped[self.a] & (difference < 0)) | (clipped[self.b] & (difference > 0))] = 0
+        return float(np.minimum(np.abs(difference), LIGHT_FIT.cap).mean()) if len(self.a) else 0.0
+
+    def contrast(self, direction: np.ndarray) -> Guess:
+        """How much brighter what a direction lights is than neighbours in its shade: the cost is less their z-score.
+
+        Whatever their texture and other light are, as neither keeps to the edges of that shade.
+        """
+        lit = self.spots.contribution(direction) > 0
+        mixed = lit[self.a] & ~lit[self.b]
+        value = self.spots.log_albedo()
+        difference = np.clip(value[self.a[mixed]] - value[self.b[mixed]], -LIGHT_FIT.cap, LIGHT_FIT.cap)
+        return Guess(direction, -float(difference.sum() / np.sqrt(max(mixed.sum(), 1))))
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         return Guess(direction, self.differ(self.spots.contribution(direction, radius), strength), strength, radius)
+
+    def strengths(self, direction: np.ndarray) -> np.ndarray:
+        """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
+
+        In the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; 0 if unknown. Elements in
+        the shadow's edge are left out: they look dark, and so are the last to be clipped.
+        """
+        spots = self.spots
+        full, softened = spots.contribution(direction), spots.contribution(direction, RADII[-1])
+        lit = np.flatnonzero((full > 0) & (softened > 0.99 * full))
+        shade = np.flatnonzero((softened <= 0) & ~spots.clipped)
+        if not len(lit) or not len(shade):
+            return np.zeros(4)
+        place = spots.place
+        distance, nearest = cKDTree(place[shade]).query(place[lit], distance_upper_bound=SUN.near)
+        a, b = lit[np.isfinite(distance)], shade[nearest[np.isfinite(distance)]]
+        clipped = spots.clipped[a]
+        if len(a) < LEVELS.enough or clipped.all():
+            return np.zeros(4)
+        strengths = []
+        for weights in (*np.eye(3), LUMINANCE):
+            value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
+            needed = received[a] * (np.exp(value[a] - value[b]) - 1) / full[a]
+            survival = ecdf(CensoredData.right_censored(needed, clipped)).sf
+            half = np.flatnonzero(survival.probabilities <= 0.5)
+            strengths.append(survival.quantiles[half[0]] if len(half) else needed[~clipped].max())
+        return np.maximum(strengths, 0)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from addon.core.light.environment import Environment
+from addon.core.light.few_elements import irradiance_at
 from addon.core.light.sun import RADIUS, Sun, extract_sun, insert_sun, sunlight
 from addon.core.luminance import LUMINANCE
-from addon.core.passes.sun.sun_patch import find_patch_sun
+from addon.core.passes.sun.sun_fit import find_sun
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.settings import Settings
@@ -212,14 +213,25 @@ def clipped_at(lit: LitDiffuse, level: float) -> LitDiffuse:
     return replace(lit, radiance=np.minimum(lit.radiance, np.float32(level)), clipped=over.astype(np.float32))
 
 
+def sun_by(room, lit: LitDiffuse) -> Sun | None:
+    """What is found in a room all of whose other light is known."""
+    field = room.field(lit.radiance, sky_map())
+
+    def irradiance(element):
+        return irradiance_at(field, element, 0)
+
+    element = np.sort(np.random.default_rng(0).choice(len(room.atlas), 8000, replace=False))
+    found = find_sun(field, element, irradiance(element), lit.seen, irradiance, room.atlas.object_id, lit.clipped > 0.5)
+    return found and found.sun
+
+
 @pytest.mark.parametrize("albedo", [sunny.ALBEDO, sunny.ALBEDO | {0: (0.35, 0.25, 0.15)}])
 def test_a_sun_is_found_by_a_patch_most_of_which_is_clipped(room, albedo):
     lit = measured(room, sunny.light(room, albedo), texture=0.3)
     patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
     lit = clipped_at(lit, float(np.quantile(lit.radiance[patch].max(1), 0.4)))
     assert lit.clipped[patch].mean() > 0.55
-    dark = room.field(lit.radiance, sky_map())
-    found = find_patch_sun(dark, dark, lit, [], 0)
+    found = sun_by(room, lit)
     assert found is not None and angle(found.direction, sunny.TOWARDS) < 1.5
     assert found.irradiance @ LUMINANCE == pytest.approx(sunny.SUN @ LUMINANCE, rel=0.4)
     assert any("sun" in word for word in found.note.split())
@@ -227,6 +239,5 @@ def test_a_sun_is_found_by_a_patch_most_of_which_is_clipped(room, albedo):
 
 def test_without_a_sun_what_is_clipped_is_none(room):
     lit = measured(room, sunny.light(room, sun=np.zeros(3)), texture=0.3)
-    dark = room.field(lit.radiance, sky_map())
     level = float(np.quantile(lit.radiance.max(1), 0.95))
-    assert find_patch_sun(dark, dark, clipped_at(lit, level), [], 0) is None
+    assert sun_by(room, clipped_at(lit, level)) is None
