@@ -15,25 +15,20 @@ from scipy.spatial import cKDTree
 
 from ...light.environment import Environment
 from ...light.field import LightField
-from ...light.sun import Sun, around
+from ...light.sun import Sun
 from ...luminance import LUMINANCE
 from ...parallel import ordered_map
 from ...scene.params import SAMPLES
 from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
-from .sun_spots import RADII, Edges, Guess, Spots, visible
+from .sun_spots import RADII, Edges, Guess, Spots, ring, visible
 
 GRID = float(np.radians(4.0))
 SHARP = np.radians([2.0, 1.0, 0.5])
 """Steps of the direction, with a point-like sun."""
 ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
-
-
-def _ring(count: int) -> np.ndarray:
-    angle = np.arange(count) * (2 * np.pi / count)
-    return np.stack([np.cos(angle), np.sin(angle)], 1)
 
 
 def _candidates(even: Spots, wide: Edges, environment: Environment) -> list[Guess]:
@@ -78,7 +73,7 @@ def _pattern_search(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np
     """
     for step in steps:
         for _ in range(4):
-            directions = (direction for direction in around(guess.direction, step * _ring(8)) if direction[2] > 0)
+            directions = (direction for direction in ring(guess.direction, step) if direction[2] > 0)
             new = min(map(cost, directions), key=lambda candidate: candidate.cost, default=guess)
             if new.cost >= guess.cost:
                 break
@@ -88,7 +83,7 @@ def _pattern_search(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np
 
 def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Elements of the `pool` that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
-    directions = around(direction, ASTRAY * np.concatenate([np.zeros((1, 2)), _ring(8), _ring(4) / 2]))
+    directions = (direction, *ring(direction, ASTRAY), *ring(direction, ASTRAY / 2, 4))
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
     lit = np.stack([visible(field.scene, sun, position, normal) > 0.1 for sun in directions])
     mixed = pool[lit.any(0) & ~lit.all(0)]
@@ -97,7 +92,7 @@ def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng
 
 @dataclass(frozen=True)
 class SolvedSun:
-    """A sun, the sample that it was found with, and its edges, with the differences along them without and with it.
+    """A sun, the sample that it was found with, and its edges, with the differences across them without and with it.
 
     Attributes
     ----------
@@ -160,25 +155,23 @@ def find_sun(
     pool = np.sort(rng.choice(pool, min(len(pool), SAMPLES.in_all), replace=False))
     sample = np.sort(rng.choice(pool, min(len(pool), SUN.even), replace=False))
     wide = Edges(spots(sample, np.ones((len(sample), 3))))
-    fits = []
     for guess in _candidates(even, wide, field.environment):
         beside = _along_edges(field, pool, guess.direction, rng)
-        if len(beside) >= LEVELS.few:
-            edges = Edges(spots(beside, irradiance(beside)))
-            fits.append((edges, _fit(edges, guess.direction)))
-    if not fits:
-        return None
-    edges, fit = min(fits, key=lambda pair: pair[1].cost / max(pair[0].differ(), 1e-9))
-    before, contribution = edges.differ(), edges.spots.contribution(fit.direction, fit.radius)
-    short = edges.spots.over() & (contribution > 0)
-    still_over = short & edges.spots.over(contribution, fit.strength)
-    if (
-        fit.cost > (1 - LEVELS.gain) * before
-        or 2 * still_over.sum() > short.sum()
-        or not _is_sunlike(edges.strengths(fit.direction))
-    ):
-        return None
-    return SolvedSun(_coloured(edges, fit.direction, fit.radius, before, fit.cost), even, edges, before, fit.cost)
+        if len(beside) < LEVELS.few:
+            continue
+        edges = Edges(spots(beside, irradiance(beside)))
+        fit = _fit(edges, guess.direction)
+        before, after = edges.across(fit)
+        lit = edges.spots.contribution(fit.direction, fit.radius)
+        short = edges.spots.over() & (lit > 0)
+        explained = short & ~edges.spots.over(lit, fit.strength)
+        if (
+            after < (1 - SUN.gain) * before
+            and 2 * explained.sum() >= short.sum()
+            and _is_sunlike(edges.strengths(fit.direction))
+        ):
+            return SolvedSun(_coloured(edges, fit.direction, fit.radius, before, after), even, edges, before, after)
+    return None
 
 
 def _fit(edges: Edges, direction: np.ndarray) -> Guess:
@@ -218,6 +211,6 @@ def _coloured(edges: Edges, direction: np.ndarray, radius: float, before: float,
     sun = Sun(np.asarray(direction, np.float32), _of_luminance(edges.strengths(direction)), radius)
     note = (
         f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
-        f"(differences of log albedo along its edges {before:.3f} to {after:.3f})."
+        f"(differences of log albedo across its edges {before:.3f} to {after:.3f})."
     )
     return replace(sun, note=note)

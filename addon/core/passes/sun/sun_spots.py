@@ -9,14 +9,21 @@ from scipy.stats import CensoredData, ecdf
 from ...light.field import LightField
 from ...light.light_fit import Sample
 from ...light.params import LIGHT_FIT
-from ...light.sun import Sun, shadow
+from ...light.sun import Sun, around, shadow
 from ...luminance import LUMINANCE
 from ...scene.rays import RayScene
+from ...scene.tangent_frame import tangent_frame
 from ...significance import LEVELS
 from .params import SUN
 
 RADII = np.radians([0.27, 0.5, 0.75, 1.0])
 """Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
+
+
+def ring(direction: np.ndarray, radius: float, count: int = 8) -> np.ndarray:
+    """Unit directions on a circle of `radius` radians around one, (count, 3) float32."""
+    angle = np.arange(count) * (2 * np.pi / count)
+    return around(direction, radius * np.stack([np.cos(angle), np.sin(angle)], 1))
 
 
 def visible(scene: RayScene, direction: np.ndarray, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -103,6 +110,14 @@ class Spots:
             return shadow(self.scene, Sun(direction, np.ones(3), radius), self.position, self.normal, self.edge, 0)[0]
         return visible(self.scene, direction, self.position, self.normal)
 
+    def lit_around(self, direction: np.ndarray) -> np.ndarray:
+        """Whether places around the elements, and the elements from directions around one, are lit, (16, m) bool."""
+        right, up = tangent_frame(self.normal)
+        angle = np.arange(8)[:, None, None] * (np.pi / 4)
+        beside = self.position + np.float32(SUN.margin * (np.cos(angle) * right + np.sin(angle) * up))
+        places = [visible(self.scene, direction, place, self.normal) for place in beside]
+        return np.stack(places + [self.contribution(towards) for towards in ring(direction, RADII[-1])]) > 0
+
 
 class Edges:
     """Neighbours on the same object along the edges of a patch: light and shade that are right leave them alike.
@@ -117,12 +132,26 @@ class Edges:
         self.a, k = np.nonzero(np.isfinite(distance[:, 1:]))
         self.b = neighbour[:, 1:][self.a, k]
 
-    def differ(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        """Mean difference of log albedo between neighbours, each held at the cap."""
+    def _differences(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
+        """Of log albedo between neighbours, each held at a cap, (k,)."""
         value, clipped = self.spots.log_albedo(contribution, strength), self.spots.clipped
         difference = value[self.a] - value[self.b]
         difference[(clipped[self.a] & (difference < 0)) | (clipped[self.b] & (difference > 0))] = 0
-        return float(np.minimum(np.abs(difference), LIGHT_FIT.cap).mean()) if len(self.a) else 0.0
+        return np.minimum(np.abs(difference), LIGHT_FIT.cap)
+
+    def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
+        """A sun, with the mean difference of neighbours under it."""
+        left = self._differences(self.spots.contribution(direction, radius), strength)
+        return Guess(direction, float(left.mean()) if len(left) else 0.0, strength, radius)
+
+    def across(self, guess: Guess) -> tuple[float, float]:
+        """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
+        lit = self.spots.contribution(guess.direction) > 0
+        two_sides = lit[self.a] != lit[self.b]
+        if not two_sides.any():
+            return 0.0, 0.0
+        left = self._differences(self.spots.contribution(guess.direction, guess.radius), guess.strength)
+        return float(self._differences()[two_sides].mean()), float(left[two_sides].mean())
 
     def contrast(self, direction: np.ndarray) -> Guess:
         """How much brighter what a direction lights is than neighbours in its shade: the cost is less their z-score.
@@ -135,19 +164,16 @@ class Edges:
         difference = np.clip(value[self.a[mixed]] - value[self.b[mixed]], -LIGHT_FIT.cap, LIGHT_FIT.cap)
         return Guess(direction, -float(difference.sum() / np.sqrt(max(mixed.sum(), 1))))
 
-    def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
-        return Guess(direction, self.differ(self.spots.contribution(direction, radius), strength), strength, radius)
-
     def strengths(self, direction: np.ndarray) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
-        In the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; 0 if unknown. Elements in
-        the shadow's edge are left out: they look dark, and so are the last to be clipped.
+        In the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; 0 if unknown. What is near
+        the shadow's edge is left out: the lit look dark there, and so are the last to be clipped, the others bright.
         """
         spots = self.spots
-        full, softened = spots.contribution(direction), spots.contribution(direction, RADII[-1])
-        lit = np.flatnonzero((full > 0) & (softened > 0.99 * full))
-        shade = np.flatnonzero((softened <= 0) & ~spots.clipped)
+        full, around_it = spots.contribution(direction), spots.lit_around(direction)
+        lit = np.flatnonzero((full > 0) & around_it.all(0))
+        shade = np.flatnonzero((full <= 0) & ~around_it.any(0) & ~spots.clipped)
         if not len(lit) or not len(shade):
             return np.zeros(4)
         place = spots.place
