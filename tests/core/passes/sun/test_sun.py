@@ -66,6 +66,21 @@ def test_a_sun_that_no_frame_sees_is_found_by_its_patch(room):
     assert np.allclose(np.median(rho, 0), sunny.ALBEDO[0], rtol=0.15)
 
 
+@pytest.mark.parametrize("sun", [sunny.SUN, np.zeros(3)])
+def test_a_chequered_floor_neither_hides_a_sun_nor_makes_one(room, sun):
+    """Dark tiles in the sun are as bright as white ones in shade, so an object's spread of albedo tells nothing."""
+    L = sunny.light(room, sun=np.asarray(sun))
+    tile = np.floor(room.atlas.position[:, :2] / 0.3).astype(int).sum(1) % 2
+    floor = room.atlas.object_id == 0
+    L[floor] *= np.where(tile[floor] == 0, 0.15, 1.4)[:, None]
+    found = run(room, L)
+    if not np.any(sun):
+        assert found.sun is None
+    else:
+        assert found.sun is not None and angle(found.sun.direction, sunny.TOWARDS) < 0.6
+        assert found.sun.irradiance @ LUMINANCE == pytest.approx(sunny.SUN @ LUMINANCE, rel=0.3)
+
+
 @pytest.mark.slow
 def test_without_a_sun_none_is_made_up(room):
     found = run(room, sunny.light(room, sun=np.zeros(3)))
