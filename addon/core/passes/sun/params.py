@@ -21,7 +21,8 @@ class SunParams:
         Directions of the grid of which the whole sample is asked; of these, those that are refined on it; and then on
         the edges of their patches.
     even : int
-        Elements over the whole surface that tell what stands out, where a room lacks light.
+        Elements by which directions are ranked; and over the whole surface, where a room lacks light, those that tell
+        what stands out.
     near, dense : float, int
         Metres between an element in a patch and that in shade that tells how bright it would be; elements along its
         edges.
