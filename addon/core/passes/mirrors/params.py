@@ -15,6 +15,9 @@ class MirrorsParams:
         How far from that plane, as a share of the object's size.
     together : float
         Least correlation, within the elements, of what they show and of what a mirror would.
+    unexplained : float
+        Most of the variance of what a region shows, in the median over its elements, that a mirror there may not
+        explain (`mirror_patches`).
     least_f0 : float
         A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
     tells : float
@@ -29,6 +32,7 @@ class MirrorsParams:
     flat_share: float = 0.8
     plane_share: float = 0.02
     together: float = 0.6
+    unexplained: float = 0.3
     least_f0: float = 0.2
     tells: float = 0.98
     stray: float = 0.5

@@ -35,13 +35,13 @@ def box():
     return with_mirror(ABOVE)
 
 
-def frames(box, f0, diffuse=0.3, noise=0.05):
-    """The floor's samples: diffuse, with a mirror in its middle; and which are the mirror's."""
+def frames(box, f0, diffuse=0.3, noise=0.05, below=0.0):
+    """The floor's samples: diffuse, with a mirror in its middle, `below` which as much is scattered."""
     element, direction, frame = box.views(900, 10)
     origin = box.room.atlas.position[element].astype(float) + [0, 0, 1e-6]
     inside = ((origin[:, :2] > LOW) & (origin[:, :2] < HIGH)).all(1)
     shown = box.arriving(origin, np.array([-1, -1, 1]) * direction)
-    seen = np.where(inside[:, None], f0 * shown, diffuse)
+    seen = np.where(inside[:, None], below + f0 * shown, diffuse)
     seen = seen * np.exp(np.random.default_rng(0).normal(0, noise, seen.shape))
     return Samples(
         element.astype(np.int32),
@@ -82,9 +82,20 @@ def test_what_is_no_mirror(box, f0, diffuse):
     assert not len(mirror_patches(box.field, frames(box, f0, diffuse)))
 
 
-def test_a_polished_floor_that_mirrors_in_one_place():
+def test_a_mirror_in_the_plane_of_its_floor():
+    """A fused mesh has no step at its rim."""
     box = with_mirror(0.0)
-    assert not len(mirror_patches(box.field, frames(box, 0.85)))
+    patches = mirror_patches(box.field, frames(box, 0.85))
+    assert len(patches.mirrors) == 1
+    corners = box.room.mesh.vertices[box.room.mesh.triangles[patches.triangle]][..., :2]
+    assert (corners > LOW - 1e-4).all() and (corners < HIGH + 1e-4).all()
+    assert len(corners) == 2
+
+
+@pytest.mark.parametrize("f0", [0.06, 0.2])
+def test_a_polished_floor_that_mirrors_in_one_place(f0):
+    box = with_mirror(0.0)
+    assert not len(mirror_patches(box.field, frames(box, f0, below=0.3)))
 
 
 def test_too_little_to_tell(box):
