@@ -1,10 +1,12 @@
 """Mirrors in a mesh without objects, where they are of one piece with the wall that they hang on.
 
-A fused mesh has a mirror in its wall's plane or a centimetre before it. Of a part, which may be a chimney and its
-sides, every direction that much of it faces is tried. Each observed element is tested together with those around it
-for showing the mirrored room, as `flat_mirrors` tests an object. A region of such elements is a mirror if the mirrored
-room explains what it shows: it leaves .09 to .24 of the variance in six mirrors of four rooms, and .35 to .9 in some
-sixty regions of polished worktops and fronts, of walls under a lamp and of curtains, in eleven rooms.
+A fused mesh has a mirror in its wall's plane, or as a flat piece before it or in a frame. Of a part, which may be a
+chimney and its sides, every direction that much of it faces is tried. Each observed element is tested together with
+those around it for showing the mirrored room, as `flat_mirrors` tests an object. A piece is a mirror if most of its
+elements do: two mirrors of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at
+most .11. A region of a larger piece is one if the mirrored room explains what it shows: it leaves .09 to .24 of the
+variance in six mirrors of four rooms, and .35 to .9 in some sixty regions of worktops and fronts, of walls under a lamp
+and of curtains, in eleven rooms.
 """
 
 from collections.abc import Iterator
@@ -14,9 +16,10 @@ from scipy.spatial import Delaunay, cKDTree
 
 from ...groups import by_number
 from ...light.field import FLAT, LightField
+from ...scene.connected_parts import weld
 from ...scene.patches import Patches
 from ...scene.samples import Samples
-from ...scene.uv_islands import components
+from ...scene.uv_islands import components, connected
 from ...significance import LEVELS
 from .mirrored import Views, tangents_of
 from .params import MIRRORS
@@ -33,7 +36,7 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     """
     atlas, mesh = field.atlas, field.mesh
     clear = np.flatnonzero(~samples.saturated)
-    normals = mesh.geometry[0]
+    welded, normals = weld(mesh.vertices), mesh.geometry[0]
     next_id, patches = int(mesh.object_id.max()) + 1, [Patches.none()]
     for object_id, index in by_number(atlas.object_id[samples.element[clear]]).items():
         observations, free = clear[index], mesh.object_id == object_id
@@ -41,27 +44,21 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
             flat = np.flatnonzero(free & (normals @ normal > FLAT))
             free[flat] = False  # none is of two pieces
             facing = observations[atlas.normal[samples.element[observations]] @ normal > FLAT]
-            position, mirrored, unexplained = _mirrored(Views.of(field, samples, facing), normal)
+            element, mirrored, unexplained = _mirrored(Views.of(field, samples, facing), normal)
             if mirrored.sum() < LEVELS.enough:
                 continue
-            region = _regions(position, mirrored)
-            tangents = tangents_of(normal)
-            middle, taken = mesh.vertices[mesh.triangles[flat]].mean(1), np.zeros(len(flat), bool)
-            for label in range(region.max() + 1):
-                inside = region == label
-                if inside.sum() < LEVELS.enough or np.median(unexplained[inside]) > MIRRORS.unexplained:
-                    continue
-                # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
-                hull, depth = Delaunay(position[inside] @ tangents.T, qhull_options="QJ"), position[inside] @ normal
-                low, high = depth.min() - atlas.texel_edge, depth.max() + atlas.texel_edge
-                chosen = (middle @ normal > low) & (middle @ normal < high) & ~taken
-                chosen &= hull.find_simplex(middle @ tangents.T) >= 0
-                taken |= chosen
-                count = int(chosen.sum())
-                if count:
-                    triangle = flat[chosen].astype(np.int32)
-                    patches.append(Patches(triangle, np.full(count, next_id, np.int32), np.array([next_id], np.int32)))
-                    next_id += 1
+            piece = np.full(len(mesh.triangles), -1)
+            piece[flat] = connected(welded[mesh.triangles[flat]])
+            within = piece[atlas.triangle[element]]
+            whole = _mirroring(within, mirrored)
+            rest = mirrored & ~np.isin(within, whole)
+            middle, position = mesh.vertices[mesh.triangles[flat]].mean(1), atlas.position[element]
+            regions = _regions_in(middle, position, rest, unexplained, normal, atlas.texel_edge)
+            for chosen in (*(piece[flat] == label for label in whole), *regions):
+                triangle = flat[chosen].astype(np.int32)
+                count = len(triangle)
+                patches.append(Patches(triangle, np.full(count, next_id, np.int32), np.array([next_id], np.int32)))
+                next_id += 1
     return Patches.together(patches)
 
 
@@ -78,6 +75,38 @@ def _facings(normals: np.ndarray) -> Iterator[np.ndarray]:
         normals = normals[normals @ normal <= FLAT]
 
 
+def _mirroring(within: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
+    """The pieces that are mirrors, as most of their elements are; `within` is each element's, (k,) int, or -1."""
+    known = np.bincount(within[within >= 0], minlength=1)
+    mirroring = np.bincount(within[mirrored & (within >= 0)], minlength=len(known))
+    return np.flatnonzero((mirroring >= LEVELS.enough) & (2 * mirroring > known))
+
+
+def _regions_in(
+    middle: np.ndarray,
+    position: np.ndarray,
+    mirrored: np.ndarray,
+    unexplained: np.ndarray,
+    normal: np.ndarray,
+    margin: float,
+) -> list[np.ndarray]:
+    """Triangles ((t,) bool, by the `middle` of each) in regions that are mirrors, each in one."""
+    region, tangents, taken = _regions(position, mirrored), tangents_of(normal), np.zeros(len(middle), bool)
+    parts = []
+    for label in range(region.max() + 1):
+        inside = region == label
+        if inside.sum() < LEVELS.enough or np.median(unexplained[inside]) > MIRRORS.unexplained:
+            continue
+        # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
+        hull, depth = Delaunay(position[inside] @ tangents.T, qhull_options="QJ"), position[inside] @ normal
+        chosen = (middle @ normal > depth.min() - margin) & (middle @ normal < depth.max() + margin) & ~taken
+        chosen &= hull.find_simplex(middle @ tangents.T) >= 0
+        taken |= chosen
+        if chosen.any():
+            parts.append(chosen)
+    return parts
+
+
 def _regions(position: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
     """The connected region of elements most of whose neighbours are `mirrored` that each is in, (k,) int; else -1."""
     count = len(position)
@@ -91,13 +120,13 @@ def _regions(position: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
 
 
 def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of elements whose mirrored radiance is known: place, (k, 3); whether a mirror explains what is around, (k,) bool.
+    """Elements ((k,) int) whose mirrored radiance is known, and around which a mirror surely explains it, (k,) bool.
 
-    Last, the share of the variance that it does not explain, (k,).
+    Last, the share of the variance around them that it leaves, (k,).
     """
     views_known = views.known(normal)
     if views_known is None:
-        return np.zeros((0, 3)), np.zeros(0, bool), np.zeros(0)
+        return np.zeros(0, int), np.zeros(0, bool), np.zeros(0)
     index, _, observed, predicted = views_known
     element, group, count = np.unique(views.element[index], return_inverse=True, return_counts=True)
     position = views.field.atlas.position[element]
@@ -115,4 +144,4 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
     unexplained = around((observed - predicted - f0[group]) ** 2) / np.maximum(variance, 1e-12)
     mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & (f0 > np.log(MIRRORS.least_f0))
-    return position, mirrored, unexplained
+    return element, mirrored, unexplained
