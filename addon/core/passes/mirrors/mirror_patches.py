@@ -5,8 +5,8 @@ chimney and its sides, every direction that much of it faces is tried. Each obse
 those around it for showing the mirrored room, as `flat_mirrors` tests an object. A piece is a mirror if most of its
 elements do: two mirrors of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at
 most .11. A region of a larger piece is one if the mirrored room explains what it shows: it leaves .09 to .24 of the
-variance in six mirrors of four rooms, and .35 to .9 in some sixty regions of worktops and fronts, of walls under a lamp
-and of curtains, in eleven rooms.
+variance in the mirrors of six rooms, and .35 to .9 in some sixty regions of worktops and fronts, of walls under a lamp
+and of curtains, in thirteen.
 """
 
 from collections.abc import Iterator
