@@ -44,7 +44,7 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
             flat = np.flatnonzero(free & (normals @ normal > FLAT))
             free[flat] = False  # none is of two pieces
             facing = observations[atlas.normal[samples.element[observations]] @ normal > FLAT]
-            element, mirrored, unexplained = _mirrored(Views.of(field, samples, facing), normal)
+            element, mirrored, unexplained, log_f0 = _mirrored(Views.of(field, samples, facing), normal)
             if mirrored.sum() < LEVELS.enough:
                 continue
             piece = np.full(len(mesh.triangles), -1)
@@ -53,7 +53,7 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
             whole = _mirroring(within, mirrored)
             rest = mirrored & ~np.isin(within, whole)
             middle, position = mesh.vertices[mesh.triangles[flat]].mean(1), atlas.position[element]
-            regions = _regions_in(middle, position, rest, unexplained, normal, atlas.texel_edge)
+            regions = _regions_in(middle, position, rest, unexplained, log_f0, normal, atlas.texel_edge)
             for chosen in (*(piece[flat] == label for label in whole), *regions):
                 triangle = flat[chosen].astype(np.int32)
                 count = len(triangle)
@@ -87,16 +87,23 @@ def _regions_in(
     position: np.ndarray,
     mirrored: np.ndarray,
     unexplained: np.ndarray,
+    log_f0: np.ndarray,
     normal: np.ndarray,
     margin: float,
 ) -> list[np.ndarray]:
     """Triangles ((t,) bool, by the `middle` of each) in regions that are mirrors, each in one."""
-    region, tangents, taken = _regions(position, mirrored), tangents_of(normal), np.zeros(len(middle), bool)
-    parts = []
+    count = len(position)
+    neighbours = cKDTree(position).query(position, k=min(LEVELS.neighbours, count))[1].reshape(count, -1)
+    region = _connected(mirrored[neighbours].mean(1) > 0.5, neighbours)
+    tangents, taken, parts = tangents_of(normal), np.zeros(len(middle), bool), []
     for label in range(region.max() + 1):
         inside = region == label
         if inside.sum() < LEVELS.enough or np.median(unexplained[inside]) > MIRRORS.unexplained:
             continue
+        # Where it mirrors an even wall nothing varies that would tell; its F0 does.
+        deviation = np.minimum(np.abs(log_f0 - np.median(log_f0[inside])), MIRRORS.stray)[neighbours].mean(1)
+        grown = _connected(inside | (deviation < np.median(deviation[inside])), neighbours)
+        inside = grown == grown[inside][0]
         # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
         hull, depth = Delaunay(position[inside] @ tangents.T, qhull_options="QJ"), position[inside] @ normal
         chosen = (middle @ normal > depth.min() - margin) & (middle @ normal < depth.max() + margin) & ~taken
@@ -107,26 +114,24 @@ def _regions_in(
     return parts
 
 
-def _regions(position: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
-    """The connected region of elements most of whose neighbours are `mirrored` that each is in, (k,) int; else -1."""
-    count = len(position)
-    neighbours = cKDTree(position).query(position, k=min(LEVELS.neighbours, count))[1].reshape(count, -1)
-    inside = mirrored[neighbours].mean(1) > 0.5
+def _connected(inside: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """The connected region, (k,) int, that each element `inside` ((k,) bool) is in by its `neighbours` ((k, c)); or -1."""
     a = np.repeat(np.flatnonzero(inside), neighbours.shape[1])
     b = neighbours[inside].ravel()
-    region = np.full(count, -1)
-    _, region[inside] = np.unique(components(a[inside[b]], b[inside[b]], count)[inside], return_inverse=True)
+    region = np.full(len(inside), -1)
+    linked = components(a[inside[b]], b[inside[b]], len(inside))[inside]
+    region[inside] = np.unique(linked, return_inverse=True)[1]
     return region
 
 
-def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Elements ((k,) int) whose mirrored radiance is known, and around which a mirror surely explains it, (k,) bool.
 
-    Last, the share of the variance around them that it leaves, (k,).
+    Then the share of the variance around them that it leaves, and the logarithm of their F0 as mirrors, (k,) each.
     """
     views_known = views.known(normal)
     if views_known is None:
-        return np.zeros(0, int), np.zeros(0, bool), np.zeros(0)
+        return np.zeros(0, int), np.zeros(0, bool), np.zeros(0), np.zeros(0)
     index, _, observed, predicted = views_known
     element, group, count = np.unique(views.element[index], return_inverse=True, return_counts=True)
     position = views.field.atlas.position[element]
@@ -139,9 +144,10 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray,
         return summed(x)[neighbours].sum(1)
 
     a, b = (x - (summed(x) / count)[group] for x in (observed, predicted))
-    f0 = np.median((summed(observed - predicted) / count)[neighbours], 1)
+    log_f0 = summed(observed - predicted) / count
+    f0 = np.median(log_f0[neighbours], 1)
     variance = around(a * a)
     correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
     unexplained = around((observed - predicted - f0[group]) ** 2) / np.maximum(variance, 1e-12)
     mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & (f0 > np.log(MIRRORS.least_f0))
-    return element, mirrored, unexplained
+    return element, mirrored, unexplained, log_f0
