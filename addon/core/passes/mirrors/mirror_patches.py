@@ -115,7 +115,7 @@ def _regions_in(
 
 
 def _connected(inside: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """The connected region ((k,) int, else -1) of each element `inside` ((k,) bool), by its `neighbours` ((k, c) int)."""
+    """The connected region ((k,) int, or -1) of each element `inside` ((k,) bool), by `neighbours` ((k, c) int)."""
     a = np.repeat(np.flatnonzero(inside), neighbours.shape[1])
     b = neighbours[inside].ravel()
     region = np.full(len(inside), -1)
