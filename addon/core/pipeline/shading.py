@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -308,9 +309,10 @@ def with_missing_light(
     if "sun" in without or dark.sun is not None:
         return lit_field, light_found, missing.shut
     element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
+    irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
     solved = find_sun(
-        dark, element, irradiance_at(lit_field, element, seed), lit_diffuse.seen,
-        lambda element: irradiance_at(lit_field, element, seed), whole, lit_diffuse.clipped > 0.5, seed,
+        dark, element, irradiance_by_all(element), lit_diffuse.seen, irradiance_by_all, whole,
+        lit_diffuse.clipped > 0.5, seed,
     )  # fmt: skip
     if solved is None:
         return lit_field, light_found, missing.shut

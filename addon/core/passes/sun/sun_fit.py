@@ -110,7 +110,8 @@ class SolvedSun:
         spots = self._edges.spots
         _, nearest = cKDTree(self._even.place).query(spots.place)
         spots.sample = replace(spots.sample, received=spots.sample.received * factor[nearest])
-        return _coloured(self._edges, self.sun.direction, self.sun.radius, self._before, self._after)
+        strengths = self._edges.strengths(self.sun.direction)
+        return _coloured(strengths, self.sun.direction, self.sun.radius, self._before, self._after)
 
 
 def find_sun(
@@ -165,12 +166,10 @@ def find_sun(
         lit = edges.spots.contribution(fit.direction, fit.radius)
         short = edges.spots.over() & (lit > 0)
         explained = short & ~edges.spots.over(lit, fit.strength)
-        if (
-            after < (1 - SUN.gain) * before
-            and 2 * explained.sum() >= short.sum()
-            and _is_sunlike(edges.strengths(fit.direction))
-        ):
-            return SolvedSun(_coloured(edges, fit.direction, fit.radius, before, after), even, edges, before, after)
+        strengths = edges.strengths(fit.direction)
+        if after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and _is_sunlike(strengths):
+            sun = _coloured(strengths, fit.direction, fit.radius, before, after)
+            return SolvedSun(sun, even, edges, before, after)
     return None
 
 
@@ -206,9 +205,9 @@ def _of_luminance(strengths: np.ndarray) -> np.ndarray:
     return (limited * (luminance / max(float(limited @ LUMINANCE), 1e-12))).astype(np.float32)
 
 
-def _coloured(edges: Edges, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
+def _coloured(strengths: np.ndarray, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
     """The sun with what each channel says of its irradiance, held near the luminance's."""
-    sun = Sun(np.asarray(direction, np.float32), _of_luminance(edges.strengths(direction)), radius)
+    sun = Sun(np.asarray(direction, np.float32), _of_luminance(strengths), radius)
     note = (
         f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
         f"(differences of log albedo across its edges {before:.3f} to {after:.3f})."
