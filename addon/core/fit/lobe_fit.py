@@ -12,6 +12,7 @@ noise's part of every product is known (`LobeLight.A_noise`), and is taken out o
 """
 
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -215,6 +216,23 @@ def fit_lobe(
         residual=float(np.median(dense.seen(solution.size[middle]))),
         residual_lambertian=float(np.median(dense.seen(lambertian[lambertian_kappa]))),
     )
+
+
+def refitted(dense: DenseProblem, fit: LobeFit, constraints: Constraints, parts: Iterable[np.ndarray]) -> np.ndarray:
+    """sqrt(phi) and the mean psi by some elements of a problem each ((g,) bool), (p, 2) float64.
+
+    With kappa, the scale of the residuals and the spread of `fit`, which is that of all elements.
+    """
+    scale = max(SIGMA_OF_MAD * fit.residual, 1e-4)
+    dense = dense if dense.spread is not None else dense.expecting(fit.phi, fit.psi, scale)
+    estimates = []
+    for part in parts:
+        solution = solve(dense.part(part), slice(None), fit.kappa, scale, constraints=constraints)
+        best = int(np.argmin(solution.total))
+        near = slice(max(best - 1, 0), best + 2)
+        root, psi = between(np.sqrt(dense.grid[near]), solution.total[near], solution.psi[:, near], best - near.start)
+        estimates.append((root, psi.mean()))
+    return np.array(estimates)
 
 
 def between(x: np.ndarray, cost: np.ndarray, psi: np.ndarray, middle: int) -> tuple[float, np.ndarray]:

@@ -185,12 +185,19 @@ def shade(
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **gathering)
     kinds = lamp_kinds(mesh, instances, surface.noise)
-    field, light = with_all_light(dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without)
+    reliable = clean & (lit_diffuse.count >= VISIBILITY.enough)
+    # A mesh whose parts were guessed may lack most of its light.
+    lacks_light = (
+        None if patches is None or "missing-light" in without else partial(is_missing, good=reliable, seed=seed)
+    )
+    field, light, missing = with_all_light(
+        dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, lacks_light
+    )
     solved = np.zeros(len(atlas), bool)
-    if patches is not None and "missing-light" not in without:
+    if missing and patches is not None:
         whole = atlas.object_id if whole is None else whole
         field, light, solved = with_missing_light(
-            dark, field, light, lit_diffuse, patches, whole, cameras, without, seed
+            dark, field, light, lit_diffuse, reliable, patches, whole, cameras, without, seed
         )
     del dark
 
@@ -236,8 +243,9 @@ def with_all_light(
     tilted: np.ndarray,
     shining: Collection[int],
     without: Collection[str],
-) -> tuple[LightField, Light]:
-    """The room with lamps, sky, sun and mirrors, and what was found of the first two.
+    lacks_light: Callable[[LightField], bool] | None = None,
+) -> tuple[LightField, Light, bool]:
+    """The room with lamps, sky, sun and mirrors, what was found of the first two, and whether it lacks light still.
 
     Parameters
     ----------
@@ -258,7 +266,9 @@ def with_all_light(
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
     clipped = lit_diffuse.clipped > 0.5
-    light, sun = find_all_light(field, good, unseen, kinds, clipped, seed, tilted, shining, without=without)
+    light, sun, missing = find_all_light(
+        field, good, unseen, kinds, clipped, seed, tilted, shining, without, lacks_light
+    )
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:
@@ -266,7 +276,7 @@ def with_all_light(
         # At its edges the surroundings are mixed in.
         radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
     field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
-    return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light
+    return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light, missing
 
 
 def with_missing_light(
@@ -274,13 +284,14 @@ def with_missing_light(
     field: LightField,
     light: Light,
     lit_diffuse: LitDiffuse,
+    good: np.ndarray,
     patches: list[int],
     whole: np.ndarray,
     cameras: Sequence[Camera],
     without: Collection[str],
     seed: int,
 ) -> tuple[LightField, Light, np.ndarray]:
-    """The room with the light of clipped patches and openings, if it lacks light; else as it is.
+    """A room that lacks light with that of clipped patches and openings, and a sun's.
 
     Last, the unseen elements for which it gives the radiance they send ((n,) bool).
 
@@ -290,12 +301,11 @@ def with_missing_light(
         As the frames show it, without lamps, dark where no frame saw it.
     field : LightField
         With all `light` that was found otherwise.
+    good : (n,) bool
+        Elements whose L_d is to be believed.
     whole : (n,) int
         The object of each element before `patches` were set apart.
     """
-    good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
-    if not is_missing(field, good, seed):
-        return field, light, np.zeros(len(field.atlas), bool)
     measured = measured_patches(patches, field.atlas, lit_diffuse)
     bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
     reflecting = dark.with_mirrors(field.mirrors)

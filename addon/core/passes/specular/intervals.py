@@ -11,8 +11,8 @@ import numpy as np
 
 from ...brdf.dielectric import MAX_F0
 from ...brdf.material import Z90
-from ...brdf.model import Brdf
-from ...fit.lobe_fit import fit_lobe
+from ...brdf.model import Constraints
+from ...fit.lobe_fit import LobeFit, refitted
 from ...fit.problem import DenseProblem, Problem
 from .models import Choice
 from .params import INTERVALS
@@ -40,7 +40,8 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
     spread, roughness_systematic = (0.0, 0.0), INTERVALS.adopted if choice.looks is None else INTERVALS.by_looks
     if choice.sigmas > 0 and problem is not None and choice.looks is None:
-        spread, roughness_systematic = jackknife(problem, choice.model), INTERVALS.roughness_systematic
+        spread = jackknife(problem, choice.fit, choice.model.constraints)
+        roughness_systematic = INTERVALS.roughness_systematic
     width = Z90 * float(np.hypot(spread[0], roughness_systematic))
     systematic = INTERVALS.metal_systematic if choice.model.lobe_alone else INTERVALS.specular_systematic
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))
@@ -49,15 +50,14 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     )
 
 
-def jackknife(problem: Problem, model: Brdf) -> tuple[float, float]:
-    """Standard errors of roughness and psi of a model's fit, as far as elements differ."""
+def jackknife(problem: Problem, fit: LobeFit, constraints: Constraints) -> tuple[float, float]:
+    """Standard errors of roughness and psi of a fit to a problem, as far as elements differ."""
     dense = DenseProblem(problem)
     count = dense.there.shape[1]
     groups = min(INTERVALS.groups, count // 3)
     if groups < 3:
         return 0.3, 0.3
     group = np.arange(count) * groups // count
-    fits = [fit_lobe(dense.part(group != left_out), constraints=model.constraints) for left_out in range(groups)]
-    estimates = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
+    estimates = refitted(dense, fit, constraints, (group != left_out for left_out in range(groups)))
     error = np.sqrt((groups - 1) / groups * np.square(estimates - estimates.mean(0)).sum(0))
     return float(error[0]), float(error[1])

@@ -42,7 +42,7 @@ class SunParams:
     reached: float = 0.05
     kept: int = 160
     refined: int = 24
-    tried: int = 4
+    tried: int = 2
     even: int = 2 * LEVELS.sample
     near: float = 0.3
     dense: int = 2000
