@@ -104,6 +104,7 @@ def reflected_light(
     grid: np.ndarray = GRID,
     proposals: Sequence[float] = GATHER.proposals,
     microfacets: Microfacets = ggx.GGX,
+    turned: bool = False,
     threads: int = 0,
     seed: int = 0,
 ) -> LobeLight:
@@ -120,6 +121,9 @@ def reflected_light(
         Widths of the lobes that rays are drawn from: those of the grid, where that is known to be short.
     microfacets : Microfacets
         Whose lobes; rays are drawn from GGX's for any of them.
+    turned : bool
+        Turn each observation's rays about the lobe by an angle of its own. At fixed angles few rays are biased, which a
+        mean over neighbours keeps; of many, those at fixed angles have less noise.
     """
     m, p = len(element), len(grid)
     halves = np.zeros((m, 2, p, 6), np.float32)
@@ -136,7 +140,7 @@ def reflected_light(
         origin = room.scene.off_surface(room.atlas.position[elements], n)
         directions, targets = [], []  # targets: the triangle that a ray must meet, or `ANY`
         for phi in proposals:
-            h = ggx.sample_visible_normal(local_wo, _stratified(len(elements), per_proposal, rng), phi)
+            h = ggx.sample_visible_normal(local_wo, _stratified(len(elements), per_proposal, rng, turned), phi)
             directions.append(2 * _dot(h, local_wo[..., None]) * h - local_wo[..., None])
             targets.append(np.full((len(elements), per_proposal), ANY, np.int32))
         if len(bright):
@@ -194,7 +198,7 @@ def highlight(
     width = max(alpha, float(GRID[0]))
     light = reflected_light(
         room, bright, element, direction, rays=rays, grid=np.array([width], np.float32), proposals=(width,),
-        microfacets=microfacets, threads=threads, seed=seed,
+        microfacets=microfacets, turned=True, threads=threads, seed=seed,
     )  # fmt: skip
     return np.asarray(f0, np.float32) * light.A[:, 0] + light.B[:, 0]
 
@@ -226,8 +230,12 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:
-    """`each` points of the unit square, one in each stratum of either axis, `count` times: (2, count, each) float32."""
+def _stratified(count: int, each: int, rng: np.random.Generator, turned: bool) -> np.ndarray:
+    """`each` points of the unit square, one in each stratum of either axis, `count` times: (2, count, each) float32.
+
+    Along the second axis in the middles of the strata, or off them by one offset for all points.
+    """
     first = (np.arange(each, dtype=np.float32) + rng.random((count, each), np.float32)) / each
-    second = (rng.permuted(np.tile(np.arange(each, dtype=np.float32), (count, 1)), axis=1) + 0.5) / each
-    return np.stack([first, second]).astype(np.float32)
+    strata = rng.permuted(np.tile(np.arange(each, dtype=np.float32), (count, 1)), axis=1)
+    offset = rng.random((count, 1), np.float32) if turned else np.float32(0.5)
+    return np.stack([first, (strata + offset) / each])
