@@ -241,10 +241,6 @@ class Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""
         return Environment(_filled(radiance, self.observations), self.observations, self.clipped)
 
-    def known(self, directions: np.ndarray) -> np.ndarray:
-        """Whether frames show the radiance from unit `directions` ((n, 3)), (n,) bool."""
-        return self.at(self.measured, directions)
-
 
 def _bin(directions: np.ndarray, height: int) -> np.ndarray:
     """Flat index of the map's cell that each direction falls in."""

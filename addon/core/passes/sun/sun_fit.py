@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun
 from ...luminance import LUMINANCE
@@ -31,9 +30,9 @@ ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
 
 
-def _candidates(even: Spots, wide: Edges, environment: Environment) -> list[Guess]:
+def _candidates(even: Spots, wide: Edges) -> list[Guess]:
     """Directions that may be the sun's, the best first: of those that reach what stands out on the `even` sample."""
-    directions = _reaching_most(even, np.flatnonzero(even.stands_out()), environment)
+    directions = _reaching_most(even, np.flatnonzero(even.stands_out()))
     guesses = list(ordered_map(wide.contrast, directions, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
     refined = ordered_map(
@@ -42,13 +41,13 @@ def _candidates(even: Spots, wide: Edges, environment: Environment) -> list[Gues
     return _distinct(list(refined))[: SUN.tried]
 
 
-def _reaching_most(spots: Spots, index: np.ndarray, environment: Environment) -> np.ndarray:
-    """Directions of the grid that reach most of the spots at `index` ((k,) int), (d, 3) float32.
+def _reaching_most(spots: Spots, index: np.ndarray) -> np.ndarray:
+    """Directions above the horizon, of the grid, that reach most of the spots at `index` ((k,) int), (d, 3) float32.
 
-    Of those above the horizon from which frames don't tell what comes.
+    Also where frames show a sky without a sun: a renderer's is seen by no camera, and what it lights tells enough.
     """
     directions = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    directions = directions[(directions[:, 2] > 0) & ~environment.known(directions)]
+    directions = directions[directions[:, 2] > 0]
     spot, ray = np.nonzero(spots.normal[index] @ directions.T > 0)
     origin = spots.scene.off_surface(spots.position[index], spots.normal[index])
     occluded = spots.scene.occluded(origin[spot], directions[ray], np.full(len(spot), np.inf, np.float32))
@@ -156,7 +155,7 @@ def find_sun(
     pool = np.sort(rng.choice(pool, min(len(pool), SAMPLES.in_all), replace=False))
     sample = np.sort(rng.choice(pool, min(len(pool), SUN.even), replace=False))
     wide = Edges(spots(sample, np.ones((len(sample), 3))))
-    for guess in _candidates(even, wide, field.environment):
+    for guess in _candidates(even, wide):
         beside = _along_edges(field, pool, guess.direction, rng)
         if len(beside) < LEVELS.few:
             continue

@@ -132,9 +132,11 @@ def test_what_shines_from_below_the_horizon_is_no_sun(room):
 
 
 @pytest.mark.slow
-def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
-    """The same patch, but every direction of the sky is known."""
-    assert run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32))).sun is None
+def test_a_sun_is_found_where_frames_show_a_sky_without_it(room):
+    """No camera sees a renderer's sun."""
+    found = run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32)))
+    assert angle(found.sun.direction, sunny.TOWARDS) < 0.6
+    assert np.allclose(found.sun.irradiance, sunny.SUN, rtol=0.15)
 
 
 def with_disc(direction, irradiance, rows=256, sky=1.0):
