@@ -223,7 +223,7 @@ def refitted(dense: DenseProblem, fit: LobeFit, constraints: Constraints, parts:
 
     With kappa, the scale of the residuals and the spread of `fit`, which is that of all elements.
     """
-    scale = max(SIGMA_OF_MAD * fit.residual, 1e-4)
+    scale = robust_scale(np.asarray(fit.residual))
     dense = dense if dense.spread is not None else dense.expecting(fit.phi, fit.psi, scale)
     estimates = []
     for part in parts:
