@@ -1,60 +1,213 @@
-"""All light that no frame shows by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
+"""All light of a room: lamps and sky, a sun, and what a mesh without objects lacks of it."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..light.few_elements import from_sun, irradiance_at
+from ..light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, spread_over
 from ..light.field import LightField
-from ..light.lamps import LampKinds
+from ..light.lamps import Lamp, LampKinds
+from ..light.mirrors import Mirror
+from ..light.openings import looked_out_by
 from ..light.sun import Sun
+from ..luminance import LUMINANCE
+from ..passes.clipped_lamps.patches import measured_patches
+from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
+from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
+from ..scene.lit_diffuse import LitDiffuse
+from ..scene.model import Camera
+from ..scene.params import VISIBILITY
+from ..scene.visibility import CLEAN, SATURATED
+from ..weighted import weighted_median
 
 
-def find_all_light(
-    field: LightField,
+def with_all_light(
+    dark: LightField,
+    lit_diffuse: LitDiffuse,
+    kinds: LampKinds,
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
+    seed: int,
+    tilted: np.ndarray,
+    shining: Collection[int],
+    without: Collection[str],
+    cameras: Sequence[Camera],
+    patches: list[int] | None,
+    whole: np.ndarray,
+) -> tuple[LightField, Light, np.ndarray]:
+    """The room with lamps, sky, sun and mirrors, and what was found of the first two.
+
+    Last, the unseen elements whose radiance the light of a mesh without objects gives, (n,) bool.
+
+    Parameters
+    ----------
+    dark : LightField
+        As the frames show it, without lamps; dark where no frame saw it.
+    find_mirrors, shining, cameras, patches
+        As in `shade`.
+    tilted : (n,) float
+        `turned_by_noise`.
+    whole : (n,) int
+        The object of each element before `patches` were set apart.
+    """
+    atlas, seen, tier = dark.atlas, lit_diffuse.seen, lit_diffuse.tier
+    clean = seen & (tier == CLEAN)
+    reliable = clean & (lit_diffuse.count >= VISIBILITY.enough)
+    # One clean look at a lamp shows what it sends.
+    good = reliable | seen & (tier == SATURATED)
+    good |= clean & barely_seen(dark, good)
+    good = good if good.any() else seen
+    real = atlas.area > 0
+    unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
+    unseen = [] if "unseen-lamps" in without else unseen
+    # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
+    field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
+    light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
+    shown = light.without_mixed(field)
+    lamps = [lamp.object_id for lamp in light.lamps]
+    lit_field = shown.with_light(lit_by(shown, list(light.lamps)), light.environment, lamps)
+    # A mesh whose parts were guessed may lack most of its light, and a sun can be told only once that is known.
+    missing = patches is not None and "missing-light" not in without and is_missing(lit_field, good=reliable, seed=seed)
+    sun = dark.sun
+    if not missing and sun is None and len(light.received) and "sun" not in without:
+        light, sun = with_sun_found(
+            shown, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
+        )
+    field = field.with_mirrors(()).with_sun(sun)
+    radiance = field.radiance.copy()
+    for lamp in light.lamps:
+        elements = atlas.elements_of(lamp.object_id)
+        # At its edges the surroundings are mixed in.
+        radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
+    field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
+    field = field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ())
+    if not missing or patches is None:
+        return field, light, np.zeros(len(atlas), bool)
+    return with_missing_light(dark, field, light, lit_diffuse, reliable, patches, whole, cameras, without, seed)
+
+
+def with_sun_found(
+    shown: LightField,
+    lit_field: LightField,
+    light: Light,
     good: np.ndarray,
     unseen_objects: list[int],
     kinds: LampKinds,
     clipped: np.ndarray,
-    seed: int = 0,
-    tilted: np.ndarray | None = None,
-    shining: Collection[int] = (),
-    without: Collection[str] = (),
-    lacks_light: Callable[[LightField], bool] | None = None,
-) -> tuple[Light, Sun | None, bool]:
-    """`find_light`, and the sun; parameters are those of `find_light`, and the elements that are `clipped` ((n,) bool).
-
-    A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
-    sun keeps it.
+    seed: int,
+    tilted: np.ndarray,
+    shining: Collection[int],
+    without: Collection[str],
+) -> tuple[Light, Sun | None]:
+    """A sun that no frame shows, and lamps and sky under it; without one `light` as it is, to the last bit.
 
     Parameters
     ----------
-    lacks_light : callable, optional
-        Whether so much light is missing still that a sun can be told only once that is known: last of what is returned.
+    shown, lit_field : LightField
+        Without what the frames show of lamps and something else at once; and with the lamps and sky of `light`.
+    good, unseen_objects, kinds, seed, tilted, shining, without
+        As in `find_light`.
+    clipped : (n,) bool
+        Elements that most frames show clipped.
     """
-    light = find_light(field, good, unseen_objects, kinds, seed, tilted, shining, without=without)
-    field = light.without_mixed(field)
-    lamps = [lamp.object_id for lamp in light.lamps]
-    lit_field = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
-    missing = lacks_light is not None and lacks_light(lit_field)
-    if missing or field.sun is not None or not len(light.received) or "sun" in without:
-        return light, field.sun, missing
-    object_id = field.atlas.object_id
-    unlit = ~np.isin(object_id, lamps)
+    object_id = shown.atlas.object_id
+    unlit = ~np.isin(object_id, [lamp.object_id for lamp in light.lamps])
     free = unlit[light.element]
     sun_fit = find_sun(
-        field, light.element[free], light.received[free], good & unlit,
+        shown, light.element[free], light.received[free], good & unlit,
         lambda element: irradiance_at(lit_field, element, seed), object_id, clipped, seed,
     )  # fmt: skip
     if sun_fit is None:
-        return light, None, False
-    lit_by_sun = field.with_sun(sun_fit.sun)
+        return light, None
+    lit_by_sun = shown.with_sun(sun_fit.sun)
     light_with_sun = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
     if not len(light_with_sun.received):
-        return light_with_sun, sun_fit.sun, False
+        return light_with_sun, sun_fit.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is solved for again beside them.
-    others = light_with_sun.received - from_sun(field.with_sun(sun_fit.sun), light.element)
+    others = light_with_sun.received - from_sun(lit_by_sun, light.element)
     factor = np.maximum(others, 0) / np.maximum(light.received, 1e-12)
-    return light_with_sun, sun_fit.under(factor[free]), False
+    return light_with_sun, sun_fit.under(factor[free])
+
+
+def with_missing_light(
+    dark: LightField,
+    field: LightField,
+    light: Light,
+    lit_diffuse: LitDiffuse,
+    good: np.ndarray,
+    patches: list[int],
+    whole: np.ndarray,
+    cameras: Sequence[Camera],
+    without: Collection[str],
+    seed: int,
+) -> tuple[LightField, Light, np.ndarray]:
+    """A room that lacks light with that of clipped patches and openings, and a sun's.
+
+    Last, the unseen elements for which it gives the radiance they send ((n,) bool).
+
+    Parameters
+    ----------
+    dark : LightField
+        As the frames show it, without lamps, dark where no frame saw it.
+    field : LightField
+        With all `light` that was found otherwise.
+    good : (n,) bool
+        Elements whose L_d is to be believed.
+    whole : (n,) int
+        The object of each element before `patches` were set apart.
+    """
+    measured = measured_patches(patches, field.atlas, lit_diffuse)
+    bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
+    reflecting = dark.with_mirrors(field.mirrors)
+    unknown, reliable = [patch for patch in patches if patch not in measured], good & ~bright
+    median_luminance = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
+    windows, directions = looked_out_by(cameras, field.scene, field.environment, median_luminance, *field.outer_box)
+    # What is seen through a crack is near, and says nothing of what lies in that direction.
+    reflecting = reflecting.with_light(reflecting.radiance, reflecting.environment.shown_in(directions))
+    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
+    if "sun" in without or dark.sun is not None:
+        return lit_field, light_found, missing.shut
+    element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
+    irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
+    solved = find_sun(
+        dark, element, irradiance_by_all(element), lit_diffuse.seen, irradiance_by_all, whole,
+        lit_diffuse.clipped > 0.5, seed,
+    )  # fmt: skip
+    if solved is None:
+        return lit_field, light_found, missing.shut
+    dark, reflecting = dark.with_sun(solved.sun), reflecting.with_sun(solved.sun)
+    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    return *with_found_light(dark, field, light, lit_diffuse, missing, measured), missing.shut
+
+
+def with_found_light(
+    dark: LightField,
+    field: LightField,
+    light: Light,
+    lit_diffuse: LitDiffuse,
+    missing: MissingLight,
+    measured: list[int],
+) -> tuple[LightField, Light]:
+    """The room with the light found `missing`; `measured` are the patches whose radiance the frames show."""
+    radiance = filled_radiance(dark)
+    for object_id, solved in missing.radiance.items():
+        of_object = dark.atlas.object_id == object_id
+        radiance[of_object] = np.maximum(radiance[of_object], solved)
+    atlas, closed = dark.atlas, missing.shut
+    radiance[closed] = missing.openings.radiance[missing.openings.behind(atlas.position[closed], atlas.normal[closed])]
+    # What looked like a lamp for want of light may do so no more.
+    seen_lamps = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*missing.brighter, *measured})
+    for lamp in seen_lamps:
+        of_object = dark.atlas.object_id == lamp.object_id
+        radiance[of_object & (lit_diffuse.tier != CLEAN)] = lamp.radiance
+    lamps = (*seen_lamps, *missing.lamps)
+    middle = np.median(dark.atlas.position, 0)
+    # What is bright is written as lamps where it lies (`Openings.panels`).
+    environment = missing.openings.without_bright().filled(missing.environment, middle)
+    field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
+    light = replace(light, lamps=lamps, environment=environment, notes=missing.notes)
+    return field.with_openings(missing.openings).with_sun(dark.sun), light

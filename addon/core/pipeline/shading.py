@@ -2,45 +2,36 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import barely_seen, filled_radiance, irradiance_at, spread_over
 from ..light.field import LightField
-from ..light.lamps import Lamp, LampKinds, lamp_kinds
+from ..light.lamps import Lamp, lamp_kinds
 from ..light.mirrors import Mirror, known_mirror
-from ..light.openings import Openings, looked_out_by
+from ..light.openings import Openings
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, extract_sun
-from ..luminance import LUMINANCE
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
-from ..passes.clipped_lamps.patches import clipped_patches, measured_patches
+from ..passes.clipped_lamps.patches import clipped_patches
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
-from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
-from ..passes.sun.params import SUN
-from ..passes.sun.sun_fit import find_sun
-from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Camera, Capture, Instance, Mesh
-from ..scene.params import VISIBILITY
 from ..scene.patches import Patches
 from ..scene.surface import Surface
 from ..scene.two_sides import fronts
-from ..scene.visibility import CLEAN, SATURATED
+from ..scene.visibility import CLEAN
 from ..settings import Settings
-from ..weighted import weighted_median
-from .find_light import find_all_light
+from .find_light import with_all_light
 from .frames import STAGE as FRAMES
 from .frames import Observed
 from .published import light as published_light
@@ -185,20 +176,10 @@ def shade(
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **gathering)
     kinds = lamp_kinds(mesh, instances, surface.noise)
-    reliable = clean & (lit_diffuse.count >= VISIBILITY.enough)
-    # A mesh whose parts were guessed may lack most of its light.
-    lacks_light = (
-        None if patches is None or "missing-light" in without else partial(is_missing, good=reliable, seed=seed)
-    )
-    field, light, missing = with_all_light(
-        dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, lacks_light
-    )
-    solved = np.zeros(len(atlas), bool)
-    if missing and patches is not None:
-        whole = atlas.object_id if whole is None else whole
-        field, light, solved = with_missing_light(
-            dark, field, light, lit_diffuse, reliable, patches, whole, cameras, without, seed
-        )
+    field, light, solved = with_all_light(
+        dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, cameras, patches,
+        atlas.object_id if whole is None else whole,
+    )  # fmt: skip
     del dark
 
     # Where there is no L_d to divide, the rough E does.
@@ -232,132 +213,6 @@ def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
     """Radians by which `noise` metres in the vertices may have turned each element, (n,) float."""
     single, sheet = fronts(mesh)
     return tilt(single, noise)[sheet[atlas.triangle]]
-
-
-def with_all_light(
-    field: LightField,
-    lit_diffuse: LitDiffuse,
-    kinds: LampKinds,
-    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
-    seed: int,
-    tilted: np.ndarray,
-    shining: Collection[int],
-    without: Collection[str],
-    lacks_light: Callable[[LightField], bool] | None = None,
-) -> tuple[LightField, Light, bool]:
-    """The room with lamps, sky, sun and mirrors, what was found of the first two, and whether it lacks light still.
-
-    Parameters
-    ----------
-    field : LightField
-        Dark where no frame saw it.
-    tilted : (n,) float
-        `turned_by_noise`.
-    """
-    atlas, seen, tier = field.atlas, lit_diffuse.seen, lit_diffuse.tier
-    clean = seen & (tier == CLEAN)
-    good = clean & (lit_diffuse.count >= VISIBILITY.enough) | seen & (tier == SATURATED)
-    # One clean look at a lamp shows what it sends.
-    good |= clean & barely_seen(field, good)
-    real = atlas.area > 0
-    unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
-    unseen = [] if "unseen-lamps" in without else unseen
-    # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
-    field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
-    good = good if good.any() else seen
-    clipped = lit_diffuse.clipped > 0.5
-    light, sun, missing = find_all_light(
-        field, good, unseen, kinds, clipped, seed, tilted, shining, without, lacks_light
-    )
-    field = field.with_mirrors(()).with_sun(sun)
-    radiance = field.radiance.copy()
-    for lamp in light.lamps:
-        elements = atlas.elements_of(lamp.object_id)
-        # At its edges the surroundings are mixed in.
-        radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
-    field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
-    return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light, missing
-
-
-def with_missing_light(
-    dark: LightField,
-    field: LightField,
-    light: Light,
-    lit_diffuse: LitDiffuse,
-    good: np.ndarray,
-    patches: list[int],
-    whole: np.ndarray,
-    cameras: Sequence[Camera],
-    without: Collection[str],
-    seed: int,
-) -> tuple[LightField, Light, np.ndarray]:
-    """A room that lacks light with that of clipped patches and openings, and a sun's.
-
-    Last, the unseen elements for which it gives the radiance they send ((n,) bool).
-
-    Parameters
-    ----------
-    dark : LightField
-        As the frames show it, without lamps, dark where no frame saw it.
-    field : LightField
-        With all `light` that was found otherwise.
-    good : (n,) bool
-        Elements whose L_d is to be believed.
-    whole : (n,) int
-        The object of each element before `patches` were set apart.
-    """
-    measured = measured_patches(patches, field.atlas, lit_diffuse)
-    bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
-    reflecting = dark.with_mirrors(field.mirrors)
-    unknown, reliable = [patch for patch in patches if patch not in measured], good & ~bright
-    median_luminance = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
-    windows, directions = looked_out_by(cameras, field.scene, field.environment, median_luminance, *field.outer_box)
-    # What is seen through a crack is near, and says nothing of what lies in that direction.
-    reflecting = reflecting.with_light(reflecting.radiance, reflecting.environment.shown_in(directions))
-    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
-    lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
-    if "sun" in without or dark.sun is not None:
-        return lit_field, light_found, missing.shut
-    element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
-    irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
-    solved = find_sun(
-        dark, element, irradiance_by_all(element), lit_diffuse.seen, irradiance_by_all, whole,
-        lit_diffuse.clipped > 0.5, seed,
-    )  # fmt: skip
-    if solved is None:
-        return lit_field, light_found, missing.shut
-    dark, reflecting = dark.with_sun(solved.sun), reflecting.with_sun(solved.sun)
-    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
-    return *with_found_light(dark, field, light, lit_diffuse, missing, measured), missing.shut
-
-
-def with_found_light(
-    dark: LightField,
-    field: LightField,
-    light: Light,
-    lit_diffuse: LitDiffuse,
-    missing: MissingLight,
-    measured: list[int],
-) -> tuple[LightField, Light]:
-    """The room with the light found `missing`; `measured` are the patches whose radiance the frames show."""
-    radiance = filled_radiance(dark)
-    for object_id, solved in missing.radiance.items():
-        of_object = dark.atlas.object_id == object_id
-        radiance[of_object] = np.maximum(radiance[of_object], solved)
-    atlas, closed = dark.atlas, missing.shut
-    radiance[closed] = missing.openings.radiance[missing.openings.behind(atlas.position[closed], atlas.normal[closed])]
-    # What looked like a lamp for want of light may do so no more.
-    seen_lamps = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*missing.brighter, *measured})
-    for lamp in seen_lamps:
-        of_object = dark.atlas.object_id == lamp.object_id
-        radiance[of_object & (lit_diffuse.tier != CLEAN)] = lamp.radiance
-    lamps = (*seen_lamps, *missing.lamps)
-    middle = np.median(dark.atlas.position, 0)
-    # What is bright is written as lamps where it lies (`Openings.panels`).
-    environment = missing.openings.without_bright().filled(missing.environment, middle)
-    field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
-    light = replace(light, lamps=lamps, environment=environment, notes=missing.notes)
-    return field.with_openings(missing.openings).with_sun(dark.sun), light
 
 
 def to_store(shading: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
