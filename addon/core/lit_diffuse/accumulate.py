@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..luminance import LUMINANCE
 from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
@@ -24,7 +25,11 @@ def frame_order(count: int, seed: int) -> np.ndarray:
 
 
 def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
-    """For each element the best tier that has enough, else the best that has any."""
+    """For each element the best tier that has enough, else the best that has any.
+
+    What most observations show clipped, and at no less than the others show, has a median above what these tell: it is
+    that of the clipped ones, a lower bound.
+    """
     # One after the other, into the first: all summaries at once were the most memory that a large room's frames took.
     best = summary(CLEAN)
     clean = best.count.copy()
@@ -33,14 +38,19 @@ def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
     def take(kind: int) -> np.ndarray:
         """Put what is to be taken of another tier into `best`; gives that tier's counts."""
         summary_of_tier = summary(kind)
-        beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean) if kind == EDGE else tier < 0
+        if kind == EDGE:
+            beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean)
+        else:
+            above = summary_of_tier.median @ LUMINANCE >= best.median @ LUMINANCE
+            beaten = (tier < 0) | (summary_of_tier.count > clean + edge) & above
         chosen = beaten & (summary_of_tier.count > 0)
         tier[chosen] = kind
         for name in ("median", "lower", "upper", "count"):
             getattr(best, name)[chosen] = getattr(summary_of_tier, name)[chosen]
         return summary_of_tier.count
 
-    edge, saturated = take(EDGE), take(SATURATED)
+    edge = take(EDGE)
+    saturated = take(SATURATED)
     clipped = saturated / np.maximum(clean + edge + saturated, 1)
     median = np.ascontiguousarray(best.median)
     return LitDiffuse(median, best.interquartile_range, best.count, tier, clipped.astype(np.float32))

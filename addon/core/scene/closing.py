@@ -154,7 +154,9 @@ def _cells_to_close(
     normals, ends = np.repeat([grid.plane.normal for grid in grids], counts, 0), np.cumsum(counts)[:-1]
     sight = sight_of([frame.camera for frame in frames], scene, points, normals, gap)
     closed = 2 * sight.through < np.maximum(sight.through + sight.out, 1)
-    looked_at = closed & (sight.out > 0)
+    # Nobody looks outside through a floor: what is bright there is the sun on it.
+    floor = np.repeat([grid.plane.name == "floor" for grid in grids], counts)
+    looked_at = closed & (sight.out > 0) & ~floor
     if looked_at.any():
         normal, area = mesh.geometry
         sample = np.random.default_rng(0).choice(len(triangles), LEVELS.sample, p=area / area.sum())
@@ -166,10 +168,13 @@ def _cells_to_close(
         outside &= ~dark | _outside(sight, _groups(grids, dark), beyond, gap)
         closed &= ~outside
     by_grid = zip(grids, np.split(closed, ends), np.split(sight.out > 0, ends), strict=True)
-    return [
-        (_with_specks_closed(grid.mask(closed_cells), grid.open), grid.mask(seen))
-        for grid, closed_cells, seen in by_grid
-    ]
+    cells = []
+    for grid, closed_cells, seen_cells in by_grid:
+        grid_closed, seen = _with_specks_closed(grid.mask(closed_cells), grid.open), grid.mask(seen_cells)
+        if grid.plane.name == "wall":
+            grid_closed = _with_windows_whole(grid_closed, seen, grid.open)
+        cells.append((grid_closed, seen))
+    return cells
 
 
 def _groups(grids: Sequence[PlaneGrid], chosen: np.ndarray) -> np.ndarray:
@@ -186,6 +191,21 @@ def _with_specks_closed(closed: np.ndarray, candidates: np.ndarray) -> np.ndarra
     """`closed` cells, and those of the `candidates` that lie in holes smaller than any window; (h, w) bool each."""
     label, _ = ndimage.label(candidates & ~closed)
     return closed | (candidates & ~closed & (np.bincount(label.ravel())[label] <= CLOSING.speck))
+
+
+def _with_windows_whole(closed: np.ndarray, seen: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """`closed` cells without what no frame saw of a window that frames look out by; (h, w) bool each.
+
+    A window is a rectangle. Where its top is out of every picture it would let in too little of the sky, and no sun.
+    """
+    looked_through, closed = candidates & ~closed, closed.copy()
+    # Glazing bars are narrower than two cells.
+    label, _ = ndimage.label(ndimage.binary_dilation(looked_through, np.ones((3, 3))), np.ones((3, 3)))
+    for box in ndimage.find_objects(np.where(looked_through, label, 0)):
+        unseen = closed[box] & ~seen[box]
+        if unseen.sum() < looked_through[box].sum():
+            closed[box] &= ~unseen
+    return closed
 
 
 def _outside(sight: Sight, group: np.ndarray, beyond: RadianceBeyond, gap: float) -> np.ndarray:

@@ -98,7 +98,7 @@ def test_the_best_kind_of_observations_is_taken():
     kinds = {
         CLEAN: summary([3, 2, 2, 0, 0, 0], 1),
         EDGE: summary([9, 4, 1, 1, 0, 0], 2),
-        SATURATED: summary([9, 9, 9, 9, 2, 0], 3),
+        SATURATED: summary([9, 4, 3, 1, 2, 0], 3),
     }
     result = _choose(kinds.__getitem__)
     assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
@@ -106,6 +106,17 @@ def test_the_best_kind_of_observations_is_taken():
     assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)
     assert result.interquartile_range[:, 0].tolist() == [1, 2, 1, 2, 3, 0]
     assert result.seen.tolist() == [True] * 5 + [False]
+
+
+def test_what_most_frames_clip_is_a_lower_bound():
+    """Three clean observations, and more that are clipped above them; as many; more, by longer exposures, below."""
+    clean, clipped = summary([3, 3, 3], 1), summary([9, 3, 9], 1.2)
+    clipped.median[2] = 0.5
+    kinds = {CLEAN: clean, EDGE: summary([0, 0, 0], 1), SATURATED: clipped}
+    result = _choose(kinds.__getitem__)
+    assert result.tier.tolist() == [SATURATED, CLEAN, CLEAN]
+    assert np.allclose(result.radiance[:, 0], [1.2, 1, 1])
+    assert np.allclose(result.clipped, [0.75, 0.5, 0.75])
 
 
 def test_a_clipped_lamp_is_told_apart(box):

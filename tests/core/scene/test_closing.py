@@ -18,8 +18,8 @@ from .test_shape_parts import AIR, fused
 
 SIZE = np.array(AIR) / 10
 NONE = np.zeros((0, 3, 3))
-WALL, CEILING = 0, 5
-"""Sides: the wall at x = 0, which the cameras face, and the ceiling."""
+WALL, FLOOR, CEILING = 0, 4, 5
+"""Sides: the wall at x = 0, which the cameras face, the floor and the ceiling."""
 
 
 def room(cut):
@@ -116,6 +116,32 @@ def test_a_window_stays_open():
     before = leaks(mesh, None)
     assert before > 0.005
     assert leaks(mesh, closing(mesh)) == pytest.approx(before, rel=0.15)
+
+
+def test_the_corner_of_a_window_that_no_frame_saw_is_open():
+    """Three in four frames see its left side, and the others its lower part."""
+    mesh = room(lambda centre, side: window(centre, side) & (centre[:, 2] < 1.6))
+    seeing = []
+    for i, frame in enumerate(frames(16)):
+        pose = frame.camera.camera_to_world.copy()
+        left = i % 4 > 0
+        pose[1, 3] = 0.6 if left else 1.2
+        camera = replace(frame.camera, camera_to_world=pose)
+        seeing.append(replace(frame, camera=replace(camera, width=33) if left else replace(camera, height=20, cy=2.0)))
+    read = pictures(*mesh, lambda start, rays: np.full(len(rays), 5.0))
+    added = close_holes(*mesh, parts_of(*mesh), tuple(seeing), read)
+    assert leaks(mesh, added) == pytest.approx(leaks(mesh, None), rel=0.15)
+
+
+def test_a_hole_in_the_floor_is_closed_however_bright_it_looks():
+    """Where the sun lies on it, depth may be missing."""
+    mesh = room(lambda centre, side: (side == FLOOR) & (np.abs(centre[:, :2] - (2.4, 1.2)) < 0.3).all(1))
+    down = [replace(frame, camera=replace(frame.camera, camera_to_world=np.eye(4))) for frame in frames()]
+    for i, frame in enumerate(down):
+        frame.camera.camera_to_world[:3, 3] = 2.2 + 0.05 * i, 1.2, 1.8
+    read = pictures(*mesh, lambda start, rays: np.full(len(rays), 5.0))
+    added = close_holes(*mesh, parts_of(*mesh), tuple(down), read)
+    assert leaks(mesh, added) < 1e-3 < leaks(mesh, None)
 
 
 def test_what_so_few_frames_see_is_closed_however_bright():

@@ -167,8 +167,9 @@ class Edges:
     def strengths(self, direction: np.ndarray) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
-        In the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; 0 if unknown. What is near
-        the shadow's edge is left out: the lit look dark there, and so are the last to be clipped, the others bright.
+        Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
+        median share of what is not clipped. Where nearly all is, their lower bound; 0 if unknown. What is near the
+        shadow's edge is left out: the lit look dark there, and so are the last to be clipped, the others bright.
         """
         spots = self.spots
         full, around_it = spots.contribution(direction), spots.lit_around(direction)
@@ -180,13 +181,19 @@ class Edges:
         distance, nearest = cKDTree(place[shade]).query(place[lit], distance_upper_bound=SUN.near)
         a, b = lit[np.isfinite(distance)], shade[nearest[np.isfinite(distance)]]
         clipped = spots.clipped[a]
-        if len(a) < LEVELS.enough or clipped.all():
+        if len(a) < LEVELS.enough:
             return np.zeros(4)
-        strengths = []
-        for weights in (*np.eye(3), LUMINANCE):
+
+        def needed(weights: np.ndarray) -> np.ndarray:
             value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
-            needed = received[a] * (np.exp(value[a] - value[b]) - 1) / full[a]
-            survival = ecdf(CensoredData.right_censored(needed, clipped)).sf
-            half = np.flatnonzero(survival.probabilities <= 0.5)
-            strengths.append(survival.quantiles[half[0]] if len(half) else needed[~clipped].max())
-        return np.maximum(strengths, 0)
+            return received[a] * (np.exp(value[a] - value[b]) - 1) / full[a]
+
+        luminance = needed(LUMINANCE)
+        told = ~clipped & (luminance > 0)
+        if told.sum() < LEVELS.few:
+            return np.full(4, max(np.median(luminance), 0))
+        survival = ecdf(CensoredData.right_censored(luminance, clipped)).sf
+        half = np.flatnonzero(survival.probabilities <= 0.5)
+        strength = survival.quantiles[half[0]] if len(half) else luminance[told].max()
+        shares = [np.median(needed(channel)[told] / luminance[told]) for channel in np.eye(3)]
+        return np.maximum(strength * np.array([*shares, 1]), 0)

@@ -242,7 +242,22 @@ def sun_by(room, lit: LitDiffuse) -> Sun | None:
     return found and found.sun
 
 
-@pytest.mark.parametrize("albedo", [sunny.ALBEDO, sunny.ALBEDO | {0: (0.35, 0.25, 0.15)}])
+DARK_FLOOR = sunny.ALBEDO | {0: (0.35, 0.25, 0.15)}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sun_is_found_by_a_patch_nearly_all_of_which_is_clipped(room, seed):
+    """Few elements tell how bright it is, and by their red alone it would be none."""
+    lit = measured(room, sunny.light(room, DARK_FLOOR), noise=0.1, texture=0.3, seed=seed)
+    patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
+    lit = clipped_at(lit, float(np.quantile(lit.radiance[patch].max(1), 0.05)))
+    assert lit.clipped[patch].mean() > 0.9
+    found = sun_by(room, lit)
+    assert found is not None and angle(found.direction, sunny.TOWARDS) < 1.5
+    assert 0.4 < found.irradiance @ LUMINANCE / (sunny.SUN @ LUMINANCE) < 2
+
+
+@pytest.mark.parametrize("albedo", [sunny.ALBEDO, DARK_FLOOR])
 def test_a_sun_is_found_by_a_patch_most_of_which_is_clipped(room, albedo):
     lit = measured(room, sunny.light(room, albedo), texture=0.3)
     patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
