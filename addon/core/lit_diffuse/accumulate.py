@@ -27,8 +27,8 @@ def frame_order(count: int, seed: int) -> np.ndarray:
 def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
     """For each element the best tier that has enough, else the best that has any.
 
-    What most observations show clipped, and at no less than the others show, has a median above what these tell: it is
-    that of the clipped ones, a lower bound.
+    Where more observations are clipped above the median of the others than there are others, the median of all is not
+    known (Kaplan and Meier 1958): it is that of the clipped ones, a lower bound.
     """
     # One after the other, into the first: all summaries at once were the most memory that a large room's frames took.
     best = summary(CLEAN)
@@ -41,8 +41,9 @@ def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
         if kind == EDGE:
             beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean)
         else:
-            above = summary_of_tier.median @ LUMINANCE >= best.median @ LUMINANCE
-            beaten = (tier < 0) | (summary_of_tier.count > clean + edge) & above
+            quartiles = (summary_of_tier.lower, summary_of_tier.median, summary_of_tier.upper)
+            above = sum((quartile @ LUMINANCE >= best.median @ LUMINANCE) * 0.25 for quartile in quartiles)
+            beaten = (tier < 0) | (above * summary_of_tier.count > clean + edge)
         chosen = beaten & (summary_of_tier.count > 0)
         tier[chosen] = kind
         for name in ("median", "lower", "upper", "count"):
