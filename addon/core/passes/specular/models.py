@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.stats import wilcoxon
 
 from ...brdf.dielectric import DIELECTRIC, MAX_F0
 from ...brdf.lambertian import LAMBERTIAN
@@ -64,6 +65,19 @@ def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
     error = saved.std() / np.sqrt(len(saved))
     # Elements seen once cost nothing either way, but for rounding.
     return float(saved.sum() / max(without.sum(), 1e-6 * len(saved))), float(saved.mean() / max(error, 1e-30))
+
+
+def _gain_of_metal(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
+    """The same with the z-score of Wilcoxon's signed-rank test where that is the greater.
+
+    A metal differs all over: most of its elements tell, and a few outliers hide that from the mean's. (The highlight of
+    a dielectric may lie on few elements, which ranks don't tell.)
+    """
+    gain, sigmas = _gain(with_lobe, without)
+    if np.array_equal(with_lobe, without):
+        return gain, sigmas
+    ranks = wilcoxon(without - with_lobe, alternative="greater", method="asymptotic")
+    return gain, max(sigmas, float(ranks.zstatistic))
 
 
 def gain_of(fit: LobeFit, held_out: Problem) -> tuple[float, float]:
@@ -160,8 +174,8 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be distinguished from that, too.
-        metal_gain, metal_sigmas = _gain(with_metal, diffuse)
-        gain_over_dielectric, sigmas_over_dielectric = _gain(with_metal, with_lobe)
+        metal_gain, metal_sigmas = _gain_of_metal(with_metal, diffuse)
+        gain_over_dielectric, sigmas_over_dielectric = _gain_of_metal(with_metal, with_lobe)
         bare_cost = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
         if min(metal_gain, gain_over_dielectric) > CHOICE.min_gain and bare_cost <= CHOICE.bare * diffuse.sum():
             if metal_sigmas > LEVELS.sigmas and sigmas_over_dielectric > LEVELS.likely:
