@@ -36,8 +36,6 @@ class Figure:
 
 APPENDIX = "benchmark"
 """Folder beside docs/ablation.md that holds the other pages; such a table may be one of them."""
-OLDER = "ablation_older.md"
-"""Among them, if there is any: what was measured of older sources."""
 ALBEDO = Figure("albedo", "albedo", "albedo, dB")
 FIGURES = (
     ALBEDO,
@@ -194,8 +192,6 @@ def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
         ) + [""]
     if missing:
         lines += ["## Not measured", "", ", ".join(item.name for item in missing) + ".", ""]
-        if (path.parent / appendix / OLDER).is_file():
-            lines += [f"Figures of older sources: [{OLDER}]({appendix}{OLDER}).", ""]
     lines += [
         "## What they do",
         "",
