@@ -189,11 +189,11 @@ class Edges:
             return received[a] * (np.exp(value[a] - value[b]) - 1) / full[a]
 
         luminance = needed(LUMINANCE)
-        told = ~clipped & (luminance > 0)
-        if told.sum() < LEVELS.few:
+        unclipped = ~clipped & (luminance > 0)
+        if unclipped.sum() < LEVELS.few:
             return np.full(4, max(np.median(luminance), 0))
         survival = ecdf(CensoredData.right_censored(luminance, clipped)).sf
         half = np.flatnonzero(survival.probabilities <= 0.5)
-        strength = survival.quantiles[half[0]] if len(half) else luminance[told].max()
-        shares = [np.median(needed(channel)[told] / luminance[told]) for channel in np.eye(3)]
+        strength = survival.quantiles[half[0]] if len(half) else luminance[unclipped].max()
+        shares = [np.median(needed(channel)[unclipped] / luminance[unclipped]) for channel in np.eye(3)]
         return np.maximum(strength * np.array([*shares, 1]), 0)
