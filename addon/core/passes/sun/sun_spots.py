@@ -132,26 +132,43 @@ class Edges:
         self.a, k = np.nonzero(np.isfinite(distance[:, 1:]))
         self.b = neighbour[:, 1:][self.a, k]
 
-    def _differences(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
-        """Of log albedo between neighbours, each held at a cap, (k,)."""
+    def _differences(
+        self, a: np.ndarray, b: np.ndarray, contribution: np.ndarray | float = 0.0, strength: float = 0.0
+    ) -> np.ndarray:
+        """Of log albedo between elements at `a` and `b` ((k,) int), each held at a cap, (k,)."""
         value, clipped = self.spots.log_albedo(contribution, strength), self.spots.clipped
-        difference = value[self.a] - value[self.b]
-        difference[(clipped[self.a] & (difference < 0)) | (clipped[self.b] & (difference > 0))] = 0
+        difference = value[a] - value[b]
+        difference[(clipped[a] & (difference < 0)) | (clipped[b] & (difference > 0))] = 0
         return np.minimum(np.abs(difference), LIGHT_FIT.cap)
+
+    def _two_sides(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What a direction lights and the nearest in its shade, all off the shadow's edge, (k,) int each.
+
+        Beside the edge the lit look dark, and so are the last to be clipped, the others bright.
+        """
+        spots = self.spots
+        lit, lit_around = spots.contribution(direction) > 0, spots.lit_around(direction)
+        bright = np.flatnonzero(lit & lit_around.all(0))
+        shade = np.flatnonzero(~lit & ~lit_around.any(0) & ~spots.clipped)
+        if not len(bright) or not len(shade):
+            return np.zeros(0, int), np.zeros(0, int)
+        place = spots.place
+        distance, nearest = cKDTree(place[shade]).query(place[bright], distance_upper_bound=SUN.near)
+        near = np.isfinite(distance)
+        return bright[near], shade[nearest[near]]
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         """A sun, with the mean difference of neighbours under it."""
-        left = self._differences(self.spots.contribution(direction, radius), strength)
+        left = self._differences(self.a, self.b, self.spots.contribution(direction, radius), strength)
         return Guess(direction, float(left.mean()) if len(left) else 0.0, strength, radius)
 
     def across(self, guess: Guess) -> tuple[float, float]:
-        """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
-        lit = self.spots.contribution(guess.direction) > 0
-        two_sides = lit[self.a] != lit[self.b]
-        if not two_sides.any():
+        """Mean difference across the edge of a shadow, without the sun and with it; 0 if there are too few."""
+        a, b = self._two_sides(guess.direction)
+        if len(a) < LEVELS.enough:
             return 0.0, 0.0
-        left = self._differences(self.spots.contribution(guess.direction, guess.radius), guess.strength)
-        return float(self._differences()[two_sides].mean()), float(left[two_sides].mean())
+        left = self._differences(a, b, self.spots.contribution(guess.direction, guess.radius), guess.strength)
+        return float(self._differences(a, b).mean()), float(left.mean())
 
     def contrast(self, direction: np.ndarray) -> Guess:
         """How much brighter what a direction lights is than neighbours in its shade: the cost is less their z-score.
@@ -168,25 +185,17 @@ class Edges:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
         Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
-        median share of what is not clipped. Where nearly all is, their lower bound; 0 if unknown. What is near the
-        shadow's edge is left out: the lit look dark there, and so are the last to be clipped, the others bright.
+        median share of what is not clipped. Where nearly all is, their lower bound; 0 if unknown.
         """
         spots = self.spots
-        full, around_it = spots.contribution(direction), spots.lit_around(direction)
-        lit = np.flatnonzero((full > 0) & around_it.all(0))
-        shade = np.flatnonzero((full <= 0) & ~around_it.any(0) & ~spots.clipped)
-        if not len(lit) or not len(shade):
-            return np.zeros(4)
-        place = spots.place
-        distance, nearest = cKDTree(place[shade]).query(place[lit], distance_upper_bound=SUN.near)
-        a, b = lit[np.isfinite(distance)], shade[nearest[np.isfinite(distance)]]
-        clipped = spots.clipped[a]
+        a, b = self._two_sides(direction)
         if len(a) < LEVELS.enough:
             return np.zeros(4)
+        full, clipped = spots.contribution(direction)[a], spots.clipped[a]
 
         def needed(weights: np.ndarray) -> np.ndarray:
             value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
-            return received[a] * (np.exp(value[a] - value[b]) - 1) / full[a]
+            return received[a] * (np.exp(value[a] - value[b]) - 1) / full
 
         luminance = needed(LUMINANCE)
         unclipped = ~clipped & (luminance > 0)
