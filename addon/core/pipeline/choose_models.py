@@ -194,7 +194,7 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
 def _by_frames(maker: Problems, object_id: int, rays: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last; a `guess` is never called metal."""
     elements = FIT.part_elements if guess else LEVELS.of_object
-    index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
+    index = maker.pick(object_id, elements, FIT.views, seed=1, to_fit=True)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.

@@ -66,15 +66,15 @@ def with_all_light(
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
     light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
-    shown = light.without_mixed(field)
+    unmixed = light.without_mixed(field)
     lamps = [lamp.object_id for lamp in light.lamps]
-    lit_field = shown.with_light(lit_by(shown, list(light.lamps)), light.environment, lamps)
+    lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
     # A mesh whose parts were guessed may lack most of its light, and a sun can be told only once that is known.
     missing = patches is not None and "missing-light" not in without and is_missing(lit_field, good=reliable, seed=seed)
     sun = dark.sun
     if not missing and sun is None and len(light.received) and "sun" not in without:
         light, sun = with_sun_found(
-            shown, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
+            unmixed, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
         )
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
@@ -90,7 +90,7 @@ def with_all_light(
 
 
 def with_sun_found(
-    shown: LightField,
+    unmixed: LightField,
     lit_field: LightField,
     light: Light,
     good: np.ndarray,
@@ -106,23 +106,23 @@ def with_sun_found(
 
     Parameters
     ----------
-    shown, lit_field : LightField
+    unmixed, lit_field : LightField
         Without what the frames show of lamps and something else at once; and with the lamps and sky of `light`.
     good, unseen_objects, kinds, seed, tilted, shining, without
         As in `find_light`.
     clipped : (n,) bool
         Elements that most frames show clipped.
     """
-    object_id = shown.atlas.object_id
+    object_id = unmixed.atlas.object_id
     unlit = ~np.isin(object_id, [lamp.object_id for lamp in light.lamps])
     free = unlit[light.element]
     sun_fit = find_sun(
-        shown, light.element[free], light.received[free], good & unlit,
+        unmixed, light.element[free], light.received[free], good & unlit,
         lambda element: irradiance_at(lit_field, element, seed), object_id, clipped, seed,
     )  # fmt: skip
     if sun_fit is None:
         return light, None
-    lit_by_sun = shown.with_sun(sun_fit.sun)
+    lit_by_sun = unmixed.with_sun(sun_fit.sun)
     light_with_sun = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
     if not len(light_with_sun.received):
         return light_with_sun, sun_fit.sun

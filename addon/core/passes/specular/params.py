@@ -17,6 +17,9 @@ class FitParams:
         Elements of a part that is found by shape alone: it is a whole wall, with other things on it. Five phone-made
         rooms: models right on .66 of the pixels with 350, on .77 with 1050 (bathroom .47 to .90, office .74 to .88, a
         kitchen .54 to .52).
+    candidates, expecting, narrow_phi : int, int, float
+        Times those elements that are asked whether they expect a highlight, rays of each view for that, and the width
+        of its lobe (`highlight-sampling`).
     looks_like_none : float
         A metal whose spread over the fitted views is so many times the other's is not compared over all views.
     broadest_phi : float
@@ -30,6 +33,9 @@ class FitParams:
 
     part_elements: int = 1050
     views: int = 12
+    candidates: int = 20
+    expecting: int = 4
+    narrow_phi: float = 0.05
     looks_like_none: float = 1.5
     broadest_phi: float = 0.5
     crease: float = float(np.radians(30))

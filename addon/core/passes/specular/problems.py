@@ -1,6 +1,6 @@
 """The fitting problem of one object, from its observations: elements, views, and the light that they reflect."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -16,7 +16,15 @@ from ...significance import LEVELS
 from .params import FIT
 
 
-def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, min_views: int, seed: int) -> np.ndarray:
+def pick(
+    samples: Samples,
+    of_object: np.ndarray,
+    elements: int,
+    views: int,
+    min_views: int,
+    seed: int,
+    expected: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> np.ndarray:
     """Indices into `samples` of up to `views` views of up to `elements` elements, sorted by element.
 
     Parameters
@@ -25,12 +33,24 @@ def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, min
         Indices of the object's observations.
     min_views : int
         Elements with fewer views are left out.
+    expected : callable, optional
+        Gives the radiance that a mirror would show in observations, (m,) int -> (m,). Half of the elements are those of
+        a larger sample in one of whose views it is most above the others.
     """
     rng = np.random.default_rng(seed)
     ids, group, count = np.unique(samples.element[of_object], return_inverse=True, return_counts=True)
     enough = np.flatnonzero(count >= min_views)
     if len(enough) > elements:
-        enough = rng.choice(enough, elements, replace=False)
+        chosen = np.zeros(0, int)
+        if expected is not None:
+            candidates = rng.choice(enough, min(FIT.candidates * elements, len(enough)), replace=False)
+            of_candidates = np.flatnonzero(np.isin(group, candidates))
+            radiance, greatest = expected(of_object[of_candidates]), np.full(len(ids), -np.inf)
+            np.maximum.at(greatest, group[of_candidates], radiance)
+            highlight = greatest - np.bincount(group[of_candidates], radiance, len(ids)) / count
+            chosen = candidates[np.argsort(-highlight[candidates], kind="stable")[: elements // 2]]
+        others = rng.choice(np.setdiff1d(enough, chosen), elements - len(chosen), replace=False)
+        enough = np.append(chosen, others)
     wanted = np.zeros(len(ids), bool)
     wanted[enough] = True
     index, group = of_object[wanted[group]], group[wanted[group]]
@@ -73,22 +93,28 @@ class Problems:
         views: int,
         min_views: int = LEVELS.views,
         seed: int = 0,
-        smooth: bool = False,
+        to_fit: bool = False,
     ) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element.
 
         Parameters
         ----------
-        smooth : bool
-            Those alone in whose pixels the surface turns by less than a crease does, or the flattest quarter: over a
-            crease a pixel shows two lobes, which no wider one approximates.
+        to_fit : bool
+            For a lobe's fit. Those alone in whose pixels the surface turns by less than a crease does, or the flattest
+            quarter: over a crease a pixel shows two lobes, which no wider one approximates. And many where highlights
+            are expected: those of a wall of tiles lie on one element in a hundred.
         """
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         index = self._usable[first:last]
-        if smooth and len(index) and "pixel-curvature" not in self._without:
+        if to_fit and len(index) and "pixel-curvature" not in self._without:
             variance = self._samples.normal_variance[index]
             index = index[variance <= max(np.sin(FIT.crease / 2) ** 2, np.quantile(variance, 0.25))]
-        return pick(self._samples, index, elements, views, min_views, self._seed + seed)
+        expected = self._mirrored if to_fit and "highlight-sampling" not in self._without else None
+        return pick(self._samples, index, elements, views, min_views, self._seed + seed, expected)
+
+    def _mirrored(self, index: np.ndarray) -> np.ndarray:
+        """The radiance that a nearly smooth mirror would show in observations ((m,) int), (m,)."""
+        return self.light(index, FIT.expecting, FIT.narrow_phi).A[:, 0].mean(1, dtype=np.float64)
 
     def light(
         self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX
