@@ -93,7 +93,7 @@ PASSES = (
         "specular",
         grazing="Lets the diffuse part darken towards grazing views.",
         pixel_curvature="Widens lobes by how the surface turns within a pixel, and fits them where it turns little.",
-        highlight_sampling="Fits lobes to half as many elements where highlights are expected as in all.",
+        highlight_sampling="Looks for a lobe once more where highlights are expected.",
         ray_noise="Takes the rays' noise out of the least squares for the lobe.",
         dielectric_prior="Gives the specular weight of dielectrics a prior.",
         see_through="Sets apart what is transparent or cut out.",

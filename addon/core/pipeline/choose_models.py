@@ -174,7 +174,7 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     all of them, and it is not judged by one colour.
     """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(maker, object_id, room.settings.specular_rays, guess)
+    choice, problem, index = _by_frames(room, maker, object_id, guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
@@ -191,15 +191,25 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     return choice, problem, target_frame(scores)
 
 
-def _by_frames(maker: Problems, object_id: int, rays: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
+def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last; a `guess` is never called metal."""
     elements = FIT.part_elements if guess else LEVELS.of_object
-    index = maker.pick(object_id, elements, FIT.views, seed=1, to_fit=True)
+    index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
-    problem = maker.problem(index, rays * LEVELS.of_object // elements)
-    return choose_model(problem, guess), problem, index
+    rays = room.settings.specular_rays * LEVELS.of_object // elements
+    problem = maker.problem(index, rays)
+    choice = choose_model(problem, guess)
+    if not choice.model.has_lobe and not guess and "highlight-sampling" not in room.settings.without:
+        # A lamp's highlight lies on one in a hundred of the elements of a wall of tiles.
+        where_expected = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True, highlights=True)
+        if not np.array_equal(where_expected, index):
+            second_problem = maker.problem(where_expected, rays)
+            second_choice = choose_model(second_problem)
+            if second_choice.model.layered:
+                return second_choice, second_problem, where_expected
+    return choice, problem, index
 
 
 def _by_looks(

@@ -55,7 +55,7 @@ def _problem(
     problems: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
 ) -> tuple[Problem | None, bool]:
     """The object's observations, and whether they suffice to see what changes with the view."""
-    index, enough = problems.pick(object_id, LEVELS.of_object, FIT.views, seed=1, to_fit=True), True
+    index, enough = problems.pick(object_id, LEVELS.of_object, FIT.views, seed=1, smooth=True), True
     if len(np.unique(problems.element(index))) < LEVELS.few:
         index, enough = problems.pick(object_id, LEVELS.of_object, LEVELS.views, min_views=1, seed=1), False
     if not len(index):

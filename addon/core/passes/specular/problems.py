@@ -93,23 +93,25 @@ class Problems:
         views: int,
         min_views: int = LEVELS.views,
         seed: int = 0,
-        to_fit: bool = False,
+        smooth: bool = False,
+        highlights: bool = False,
     ) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element.
 
         Parameters
         ----------
-        to_fit : bool
-            For a lobe's fit. Those alone in whose pixels the surface turns by less than a crease does, or the flattest
-            quarter: over a crease a pixel shows two lobes, which no wider one approximates. And many where highlights
-            are expected: those of a wall of tiles lie on one element in a hundred.
+        smooth : bool
+            Those alone in whose pixels the surface turns by less than a crease does, or the flattest quarter: over a
+            crease a pixel shows two lobes, which no wider one approximates.
+        highlights : bool
+            Half of the elements are those where a highlight is expected.
         """
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         index = self._usable[first:last]
-        if to_fit and len(index) and "pixel-curvature" not in self._without:
+        if smooth and len(index) and "pixel-curvature" not in self._without:
             variance = self._samples.normal_variance[index]
             index = index[variance <= max(np.sin(FIT.crease / 2) ** 2, np.quantile(variance, 0.25))]
-        expected = self._mirrored if to_fit and "highlight-sampling" not in self._without else None
+        expected = self._mirrored if highlights else None
         return pick(self._samples, index, elements, views, min_views, self._seed + seed, expected)
 
     def _mirrored(self, index: np.ndarray) -> np.ndarray:
