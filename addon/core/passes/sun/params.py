@@ -12,9 +12,12 @@ class SunParams:
     Attributes
     ----------
     gain : float
-        Share by which the differences of log albedo between what is lit and the nearest in shade must fall. With a sun
-        two kitchens, one as a phone shows it, and a bedroom gain .56 to .68; other directions, and eight rooms without
-        one, up to .16; the pool of a spotlight .22.
+        Share by which the differences of log albedo between neighbours on two sides of the patch's edge must fall. With
+        a sun five rooms gain .36 to .54 and a kitchen as a phone shows it .23; other directions, and twelve rooms
+        without one, up to .1.
+    along : float
+        The same of all neighbours along the edge, also those on one side of it: suns .37 and .42, a sheet of paper .01,
+        the pool of a spotlight less than none.
     reached : float
         Least share of what stands out that a direction must reach.
     kept, refined, tried : int
@@ -38,7 +41,8 @@ class SunParams:
         So may be those whose log albedo is so far above their object's median (2.7 times).
     """
 
-    gain: float = 0.25
+    gain: float = 0.15
+    along: float = 0.05
     reached: float = 0.05
     kept: int = 160
     refined: int = 24

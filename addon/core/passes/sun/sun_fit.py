@@ -166,9 +166,9 @@ def find_sun(
         short = edges.spots.over() & (lit > 0)
         explained = short & ~edges.spots.over(lit, fit.strength)
         strengths = edges.strengths(fit.direction)
-        # A lamp's pool of light has another outline, or fades out.
-        fits = after < (1 - SUN.gain) * before and fit.cost < edges.explained(fit.direction, 0.0, 0.0).cost
-        if fits and 2 * explained.sum() >= short.sum() and _is_sunlike(strengths):
+        # Paper in reach of a window differs across the edge of such a patch, but its own edges lie elsewhere.
+        alike = fit.cost < (1 - SUN.along) * edges.explained(fit.direction, 0.0, 0.0).cost
+        if alike and after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and _is_sunlike(strengths):
             sun = _coloured(strengths, fit.direction, fit.radius, before, after)
             return SolvedSun(sun, even, edges, before, after)
     return None

@@ -163,10 +163,12 @@ class Edges:
         return Guess(direction, float(left.mean()) if len(left) else 0.0, strength, radius)
 
     def across(self, guess: Guess) -> tuple[float, float]:
-        """Mean difference across the edge of a shadow, without the sun and with it; 0 if there are too few."""
-        a, b = self._two_sides(guess.direction)
-        if len(a) < LEVELS.enough:
+        """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
+        lit = self.spots.contribution(guess.direction) > 0
+        two_sides = lit[self.a] != lit[self.b]
+        if not two_sides.any():
             return 0.0, 0.0
+        a, b = self.a[two_sides], self.b[two_sides]
         left = self._differences(a, b, self.spots.contribution(guess.direction, guess.radius), guess.strength)
         return float(self._differences(a, b).mean()), float(left.mean())
 
