@@ -20,7 +20,7 @@ FAINT = np.array([[0.5] * 3] * 6)
 
 
 def small_lamp(box: Box, elements: int):
-    """Whether each of the box's floor elements shows the lamp mirrored in a view, and a maker of their problems."""
+    """Views of some of the floor, the elements that show the lamp mirrored in one of them, and all elements."""
     element, direction, frame = box.views(elements, 4)
     n = len(element)
     samples = Samples(
