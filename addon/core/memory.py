@@ -14,6 +14,7 @@ LARGE: Block[int] = 1 << 22
 """Bytes of an array that gets pages of its own: those of blocks are smaller, those of all elements larger."""
 M_TRIM_THRESHOLD: Code[int] = -1  # malloc.h
 M_MMAP_THRESHOLD: Code[int] = -3
+M_ARENA_MAX: Code[int] = -8
 
 
 class Budget:
@@ -122,11 +123,12 @@ def give_back() -> None:
 
 
 def give_back_at_once() -> None:
-    """Let the system have large arrays as soon as they are freed: glibc would keep up to 32 MiB of each for later."""
+    """Let the system have large arrays as soon as they are freed: glibc would keep up to 32 MiB of each for later, and
+    of smaller ones what each thread freed for itself."""
     set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if set_option is not None:
-        for option, size in (M_MMAP_THRESHOLD, LARGE), (M_TRIM_THRESHOLD, 16 * LARGE):
-            set_option(option, size)
+        for option, value in (M_MMAP_THRESHOLD, LARGE), (M_TRIM_THRESHOLD, 16 * LARGE), (M_ARENA_MAX, 1):
+            set_option(option, value)
 
 
 def peak_memory() -> int | None:

@@ -130,8 +130,8 @@ class _Scene:
 
     def mesh_views(self, convention: Convention) -> list[MeshView]:
         cameras = convention.cameras([view.camera for view in self.views])
-        bends = not self.capture.mesh.whole
-        return [mesh_view(camera, self.capture.mesh, self.rays, bends) for camera in cameras]
+        mesh = replace(self.capture.mesh)  # whose normals are not needed any more afterwards
+        return [mesh_view(camera, mesh, self.rays, not mesh.whole) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:
         return replace(fit, edge=edge_score(self.views, self.mesh_views(fit.convention)))

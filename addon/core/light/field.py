@@ -110,7 +110,7 @@ class LightField:
         """The same room with a sun, or without one. Rays don't meet it: its part of E is `sun.sunlight`."""
         return self._with(sun=sun)
 
-    def with_unseen(self, radiance: np.ndarray) -> LightField:
+    def with_unseen(self, radiance: np.ndarray | None) -> LightField:
         """The same room with the likely radiance, (n, 3) float32, of elements that no frame saw, which are dark."""
         return self._with(unseen=radiance)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..scene.model import Frame, Mesh, Pixels
 from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
 from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, bytes_of_frame, observe, view_frame
-from .medians import Summary, make_estimator
+from .medians import Estimator, Summary, make_estimator, summaries
 
 
 def frame_order(count: int, seed: int) -> np.ndarray:
@@ -24,37 +25,47 @@ def frame_order(count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).permutation(count)
 
 
-def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
-    """For each element the best tier that has enough, else the best that has any.
+def _choose(best: Summary, edge: Summary, saturated: Summary) -> LitDiffuse:
+    """For each element the best tier that has enough, else the best that has any; into `best`, the clean one.
 
     Where more observations are clipped above the median of the others than there are others, the median of all is not
     known (Kaplan and Meier 1958): it is that of the clipped ones, a lower bound.
     """
-    # One after the other, into the first: all summaries at once were the most memory that a large room's frames took.
-    best = summary(CLEAN)
     clean = best.count.copy()
     tier = np.where(clean > 0, np.int8(CLEAN), np.int8(-1))
 
-    def take(kind: int) -> np.ndarray:
-        """Put what is to be taken of another tier into `best`; gives that tier's counts."""
-        summary_of_tier = summary(kind)
-        if kind == EDGE:
-            beaten = (clean < VISIBILITY.enough) & (summary_of_tier.count >= clean)
-        else:
-            quartiles = (summary_of_tier.lower, summary_of_tier.median, summary_of_tier.upper)
-            above = sum((quartile @ LUMINANCE >= best.median @ LUMINANCE) * 0.25 for quartile in quartiles)
-            beaten = (tier < 0) | (above * summary_of_tier.count > clean + edge)
-        chosen = beaten & (summary_of_tier.count > 0)
+    def take(kind: int, other: Summary, beaten: np.ndarray) -> None:
+        chosen = beaten & (other.count > 0)
         tier[chosen] = kind
         for name in ("median", "lower", "upper", "count"):
-            getattr(best, name)[chosen] = getattr(summary_of_tier, name)[chosen]
-        return summary_of_tier.count
+            getattr(best, name)[chosen] = getattr(other, name)[chosen]
 
-    edge = take(EDGE)
-    saturated = take(SATURATED)
-    clipped = saturated / np.maximum(clean + edge + saturated, 1)
-    median = np.ascontiguousarray(best.median)
-    return LitDiffuse(median, best.interquartile_range, best.count, tier, clipped.astype(np.float32))
+    take(EDGE, edge, (clean < VISIBILITY.enough) & (edge.count >= clean))
+    quartiles = (saturated.lower, saturated.median, saturated.upper)
+    above = sum((quartile @ LUMINANCE >= best.median @ LUMINANCE) * 0.25 for quartile in quartiles)
+    take(SATURATED, saturated, (tier < 0) | (above * saturated.count > clean + edge.count))
+    clipped = saturated.count / np.maximum(clean + edge.count + saturated.count, 1)
+    return LitDiffuse(best.median, best.interquartile_range, best.count, tier, clipped.astype(np.float32))
+
+
+def _chosen(estimators: dict[int, Estimator], count: int) -> LitDiffuse:
+    """`_choose` for all elements. By blocks: all summaries at once were the most memory that a large room's frames
+    took."""
+    result = LitDiffuse(
+        radiance=np.empty((count, 3), np.float32),
+        interquartile_range=np.empty((count, 3), np.float32),
+        count=np.empty(count, np.int32),
+        tier=np.empty(count, np.int8),
+        clipped=np.empty(count, np.float32),
+    )
+    start = 0
+    for of_block in zip(*(summaries(estimators[tier]) for tier in (CLEAN, EDGE, SATURATED)), strict=True):
+        chosen = _choose(*of_block)
+        for field in fields(LitDiffuse):
+            values = getattr(chosen, field.name)
+            getattr(result, field.name)[start : start + len(values)] = values
+        start += len(chosen.count)
+    return result
 
 
 def accumulate(
@@ -134,4 +145,4 @@ def accumulate(
                 also(index, view, pixels, observations)
             if progress is not None:
                 progress.update(0.9 * (done + 1) / len(order))
-        return _choose(lambda tier: estimators[tier].result())
+        return _chosen(estimators, len(atlas))

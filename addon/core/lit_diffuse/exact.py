@@ -1,12 +1,13 @@
 """The exact median: every observation is kept on disk meanwhile."""
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..paper.p_square import QUARTILES, Summary, between
-from ..parallel import blocks, ordered_map
+from ..parallel import ordered_map
 
 
 class Exact:
@@ -23,7 +24,7 @@ class Exact:
     def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
         self._count = count
         self._threads = threads
-        self._buckets = -(-count // self.BUCKET)
+        self._buckets = max(-(-count // self.BUCKET), 1)
         self._folder = tempfile.TemporaryDirectory(dir=folder, prefix="tmp-observations-")
         self._path = Path(self._folder.name) / "observations"
         self._held: list[tuple[np.ndarray, np.ndarray]] = []  # records, and where each bucket starts in them
@@ -83,17 +84,19 @@ class Exact:
                 quartiles[same_count, :, quartile] = between(rows, share * (observations - 1)).T
         return quartiles, count
 
-    def result(self) -> Summary:
-        lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
-        count = np.empty(self._count, np.int32)
+    def summaries(self) -> Iterator[Summary]:
+        """Of all that was added: `BUCKET` elements after another. Once alone: the observations are gone then."""
         sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
         bucket_bytes = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
-        summaries = ordered_map(self._summarise, range(self._buckets), self._threads, each=bucket_bytes)
-        for part, (quartiles, counts) in zip(blocks(self._count, self.BUCKET), summaries, strict=True):
-            lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)
-            count[part] = counts
+        for quartiles, count in ordered_map(self._summarise, range(self._buckets), self._threads, each=bucket_bytes):
+            lower, median, upper = np.ascontiguousarray(quartiles.transpose(2, 0, 1))
+            yield Summary(median, lower, upper, count.astype(np.int32))
         self.close()
-        return Summary(median, lower, upper, count)
+
+    def result(self) -> Summary:
+        parts = list(self.summaries())
+        names = ("median", "lower", "upper", "count")
+        return Summary(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def close(self) -> None:
         self._held.clear()

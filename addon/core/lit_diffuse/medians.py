@@ -3,7 +3,7 @@
 Measured against one another: `scan-relight benchmark lit_diffuse`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -59,3 +59,8 @@ def make_estimator(name: str, count: int, folder: Path | str | None = None, thre
         "mean": lambda: Mean(count),
     }
     return make[name]()
+
+
+def summaries(estimator: Estimator) -> Iterator[Summary]:
+    """What an estimator's `result` is, by blocks of elements where it can."""
+    return estimator.summaries() if isinstance(estimator, Exact) else iter([estimator.result()])

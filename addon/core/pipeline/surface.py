@@ -104,7 +104,7 @@ def to_store(surface: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict
 
 def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Mesh) -> Surface:
     """The inverse of `to_store`."""
-    mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
+    mesh = replace(captured, vertices=arrays.get("vertices", captured.vertices), uv=None)
     mesh = with_backs(mesh, arrays["backs"])
     elements = Elements(**{name: arrays[name] for name in Elements._fields})
     size, texel, noise = int(meta["size"]), float(meta["texel_size"]), float(meta["noise"])

@@ -88,9 +88,10 @@ class Atlas:
 
     def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""
-        flat = np.full((self.size * self.size, *values.shape[1:]), empty, values.dtype)
-        covered = self.padding >= 0
-        flat[covered] = values[self.padding[covered]]
+        flat = np.empty((self.size * self.size, *values.shape[1:]), values.dtype)
+        # Into place: what indexing makes for a moment is as large as a large room's image.
+        np.take(values, self.padding, 0, out=flat, mode="clip")
+        flat[self.padding < 0] = empty
         return flat.reshape(self.size, self.size, *values.shape[1:])
 
 

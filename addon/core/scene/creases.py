@@ -4,11 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..kinds import Block
+from ..parallel import blocks
 from .atlas import Atlas
 from .model import Mesh
 from .params import CREASES
 from .two_sides import flipped, fronts
 from .weld import one_place, welded
+
+AT_ONCE: Block[int] = 1 << 17
+"""Elements that are looked at together."""
 
 
 def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
@@ -66,16 +71,18 @@ def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
     """
     angles = edge_angles(mesh, np.bincount(atlas.triangle, minlength=len(mesh.triangles)) > 0)
     relative_error = np.zeros(len(atlas), np.float32)
-    corners = mesh.vertices[mesh.triangles].astype(np.float32)
-    bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * CREASES.knee).any(1))
-    triangle, position = atlas.triangle[bent], atlas.position[bent]
-    for k in range(3):
-        a, b = corners[triangle, (k + 1) % 3], corners[triangle, (k + 2) % 3]
-        direction = b - a
-        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-12)
-        offset = position - a
-        offset -= (offset * direction).sum(1, keepdims=True) * direction
-        near = np.maximum(1 - np.linalg.norm(offset, axis=1) / (CREASES.reach * texel), 0)
-        error = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
-        relative_error[bent] = np.maximum(relative_error[bent], error)
+    bent = np.flatnonzero((angles > 0.01 * CREASES.knee).any(1)[atlas.triangle])
+    for part in blocks(len(bent), AT_ONCE):
+        elements = bent[part]
+        triangle, position = atlas.triangle[elements], atlas.position[elements]
+        corners = mesh.vertices[mesh.triangles[triangle]].astype(np.float32)
+        for k in range(3):
+            a, b = corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]
+            direction = b - a
+            direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-12)
+            offset = position - a
+            offset -= (offset * direction).sum(1, keepdims=True) * direction
+            near = np.maximum(1 - np.linalg.norm(offset, axis=1) / (CREASES.reach * texel), 0)
+            error = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
+            relative_error[elements] = np.maximum(relative_error[elements], error)
     return relative_error

@@ -149,17 +149,31 @@ def find_elements(
     count = np.bincount(triangle, minlength=len(mesh.triangles))
     area = mesh.geometry[1]
     shared = (area[triangle] / count[triangle]).astype(np.float32)
-    element = np.full(size * size, -1, np.int32)
-    element[texel] = np.arange(len(texel), dtype=np.int32)
-    fields = texel, triangle, position, shared
+    padding = np.full(size * size, -1, np.int32)
+    padding[texel] = np.arange(len(texel), dtype=np.int32)
+    elements, own = Elements(texel, triangle, position, shared, padding), len(texel)
+    del texel, triangle, position, shared  # each is joined with another, and then no longer held
     if crumbs is not None and len(crumbs.triangle):
-        crumb_fields = _of_crumbs(mesh, size, area, crumbs)
-        texels_of_crumb = crumb_fields[0][:, None] + np.array([0, 1, size, size + 1])
-        element[texels_of_crumb] = len(texel) + np.arange(len(texels_of_crumb), dtype=np.int32)[:, None]
-        fields = tuple(np.concatenate(both) for both in zip(fields, crumb_fields, strict=True))
-    element = element.reshape(size, size)
-    row, column = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
-    return _merged(Elements(*fields, element[row, column].ravel()), len(texel), coarse)
+        elements = _with_crumbs(elements, _of_crumbs(mesh, size, area, crumbs), size)
+    return _merged(elements._replace(padding=_padded(elements.padding, size)), own, coarse)
+
+
+def _with_crumbs(elements: Elements, of_crumbs: tuple[np.ndarray, ...], size: int) -> Elements:
+    """Elements, and those of cells of crumbs after them."""
+    texels = of_crumbs[0][:, None] + np.array([0, 1, size, size + 1])
+    padding = elements.padding
+    padding[texels] = len(elements.texel) + np.arange(len(texels), dtype=np.int32)[:, None]
+    texel, triangle, position, area = (np.concatenate(both) for both in zip(elements[:-1], of_crumbs, strict=True))
+    return Elements(texel, triangle, position, area, padding)
+
+
+def _padded(element: np.ndarray, size: int) -> np.ndarray:
+    """The element at each texel ((size * size,) int32), or the nearest one where it is -1."""
+    empty = element.reshape(size, size) < 0
+    row, column = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
+    row *= size
+    row += column
+    return element.take(row.ravel())
 
 
 def _of_crumbs(mesh, size, area, crumbs):

@@ -98,10 +98,9 @@ def _with_back_signs(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
 
 
 def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
-    """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first."""
-    sign = _with_back_signs(mesh, sign)
-    uv = None if mesh.uv is None else turned(mesh.uv, sign)
-    return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
+    """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first;
+    without texture coordinates of its own."""
+    return replace(mesh, triangles=turned(mesh.triangles, _with_back_signs(mesh, sign)), uv=None)
 
 
 def atlas_size(area: float, texel: float, largest: int) -> int:

@@ -95,12 +95,8 @@ def summary(count, value) -> Summary:
 
 def test_the_best_kind_of_observations_is_taken():
     """Elements: enough clean; two clean, more at edges; two clean, one at an edge; edge; saturated; nothing."""
-    kinds = {
-        CLEAN: summary([3, 2, 2, 0, 0, 0], 1),
-        EDGE: summary([9, 4, 1, 1, 0, 0], 2),
-        SATURATED: summary([9, 4, 3, 1, 2, 0], 3),
-    }
-    result = _choose(kinds.__getitem__)
+    clean, edge = summary([3, 2, 2, 0, 0, 0], 1), summary([9, 4, 1, 1, 0, 0], 2)
+    result = _choose(clean, edge, summary([9, 4, 3, 1, 2, 0], 3))
     assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
     assert result.count.tolist() == [3, 4, 2, 1, 2, 0]
     assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)
@@ -112,8 +108,7 @@ def test_what_most_frames_clip_is_a_lower_bound():
     """Three clean observations, and more that are clipped above them; as many; more, by longer exposures, below."""
     clean, clipped = summary([3, 3, 3], 1), summary([9, 3, 9], 1.2)
     clipped.median[2] = 0.5
-    kinds = {CLEAN: clean, EDGE: summary([0, 0, 0], 1), SATURATED: clipped}
-    result = _choose(kinds.__getitem__)
+    result = _choose(clean, summary([0, 0, 0], 1), clipped)
     assert result.tier.tolist() == [SATURATED, CLEAN, CLEAN]
     assert np.allclose(result.radiance[:, 0], [1.2, 1, 1])
     assert np.allclose(result.clipped, [0.75, 0.5, 0.75])

@@ -68,12 +68,13 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's neighbourhood.
     k = min(PRIOR.neighbours, max(len(references) // 8, 3), len(references))
-    neighbours = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
+    tree, neighbours = cKDTree(references), np.empty((len(position), k), np.int32)
     median = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
     channels = np.ascontiguousarray(log_rho.T)
 
     def gather(part: slice) -> None:
+        neighbours[part] = tree.query(position[part], k=k)[1].reshape(-1, k)
         values = channels[:, neighbours[part]]
         median[part] = _median(values).T
         width[part] = SIGMA_OF_MAD * _median(np.abs(values - median[part].T[..., None]).mean(0))
