@@ -167,7 +167,7 @@ def find_sun(
         explained = short & ~edges.spots.over(lit, fit.strength)
         strengths = edges.strengths(fit.direction)
         # Paper in reach of a window differs across the edge of such a patch, but its own edges lie elsewhere.
-        alike = fit.cost < (1 - SUN.along) * edges.explained(fit.direction, 0.0, 0.0).cost
+        alike = fit.cost < (1 - SUN.along) * edges.without_sun()
         if alike and after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and _is_sunlike(strengths):
             sun = _coloured(strengths, fit.direction, fit.radius, before, after)
             return SolvedSun(sun, even, edges, before, after)

@@ -141,13 +141,13 @@ class Edges:
         difference[(clipped[a] & (difference < 0)) | (clipped[b] & (difference > 0))] = 0
         return np.minimum(np.abs(difference), LIGHT_FIT.cap)
 
-    def _two_sides(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What a direction lights and the nearest in its shade, all off the shadow's edge, (k,) int each.
+    def _two_sides(self, direction: np.ndarray, lit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What a direction lights ((m,) bool) and the nearest in its shade, all off the shadow's edge, (k,) int each.
 
         Beside the edge the lit look dark, and so are the last to be clipped, the others bright.
         """
         spots = self.spots
-        lit, lit_around = spots.contribution(direction) > 0, spots.lit_around(direction)
+        lit_around = spots.lit_around(direction)
         bright = np.flatnonzero(lit & lit_around.all(0))
         shade = np.flatnonzero(~lit & ~lit_around.any(0) & ~spots.clipped)
         if not len(bright) or not len(shade):
@@ -159,8 +159,15 @@ class Edges:
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         """A sun, with the mean difference of neighbours under it."""
-        left = self._differences(self.a, self.b, self.spots.contribution(direction, radius), strength)
-        return Guess(direction, float(left.mean()) if len(left) else 0.0, strength, radius)
+        return Guess(direction, self._mean(self.spots.contribution(direction, radius), strength), strength, radius)
+
+    def without_sun(self) -> float:
+        """The mean difference of neighbours without a sun."""
+        return self._mean(0.0, 0.0)
+
+    def _mean(self, contribution: np.ndarray | float, strength: float) -> float:
+        left = self._differences(self.a, self.b, contribution, strength)
+        return float(left.mean()) if len(left) else 0.0
 
     def across(self, guess: Guess) -> tuple[float, float]:
         """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
@@ -190,10 +197,11 @@ class Edges:
         median share of what is not clipped. Where nearly all is, their lower bound; 0 if unknown.
         """
         spots = self.spots
-        a, b = self._two_sides(direction)
+        contribution = spots.contribution(direction)
+        a, b = self._two_sides(direction, contribution > 0)
         if len(a) < LEVELS.enough:
             return np.zeros(4)
-        full, clipped = spots.contribution(direction)[a], spots.clipped[a]
+        full, clipped = contribution[a], spots.clipped[a]
 
         def needed(weights: np.ndarray) -> np.ndarray:
             value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
