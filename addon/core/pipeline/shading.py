@@ -181,7 +181,7 @@ def shade(
         atlas.object_id if whole is None else whole,
     )  # fmt: skip
     del dark
-    field = field.with_unseen(None)
+    field = field.with_unseen(None)  # the search for lamps alone asked for it
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}

@@ -152,7 +152,7 @@ def find_elements(
     padding = np.full(size * size, -1, np.int32)
     padding[texel] = np.arange(len(texel), dtype=np.int32)
     elements, own = Elements(texel, triangle, position, shared, padding), len(texel)
-    del texel, triangle, position, shared  # each is joined with another, and then no longer held
+    del texel, triangle, position, shared  # or they were held beside what is made of them
     if crumbs is not None and len(crumbs.triangle):
         elements = _with_crumbs(elements, _of_crumbs(mesh, size, area, crumbs), size)
     return _merged(elements._replace(padding=_padded(elements.padding, size)), own, coarse)
