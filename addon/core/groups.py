@@ -14,10 +14,12 @@ def by_label(label: np.ndarray) -> list[np.ndarray]:
 
 def cell_of(position: np.ndarray, edge: float) -> np.ndarray:
     """A number for the cell of a grid that each point ((n, 3)) lies in, rising with x, then y, then z, (n,) int64."""
-    place = np.floor(position / edge).astype(np.int64)
-    place -= place.min(0, initial=np.iinfo(np.int64).max)
-    extent = place.max(0, initial=0) + 1
-    return (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2]
+    number = np.zeros(len(position), np.int64)
+    for coordinate in position.T:  # one by one: places of all three are the size of six float32 arrays
+        place = np.floor(coordinate / edge).astype(np.int64)
+        place -= place.min(initial=np.iinfo(np.int64).max)
+        number = number * (place.max(initial=0) + 1) + place
+    return number
 
 
 def by_number(label: np.ndarray) -> dict[int, np.ndarray]:

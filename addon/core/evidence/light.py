@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from ..groups import by_number
+from ..groups import by_number, cell_of
 from ..kinds import Unit
 from ..light.environment import Environment
 from ..light.field import LightField
@@ -67,14 +67,11 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     """
     edge = float(np.sqrt(atlas.weight.sum(dtype=np.float64) / count))
     # Small things and edges occupy more cells than their area says.
-    cell_edge = 1.3 * max(edge, 1e-9)
+    cell = cell_of(atlas.position, 1.3 * max(edge, 1e-9))
     main = np.abs(atlas.normal).argmax(1)
     side = 2 * main + (np.take_along_axis(atlas.normal, main[:, None], 1)[:, 0] > 0)
     key = 12 * atlas.object_id.astype(np.int64) + 6 * seen + side
-    for axis in range(3):
-        cell = np.floor(atlas.position[:, axis] / cell_edge).astype(np.int64)
-        cell -= cell.min()
-        key = key * (cell.max() + 1) + cell
+    key = key * (cell.max() + 1) + cell
     names, nearest = np.unique(key, return_inverse=True)
     chosen = np.empty(len(names), np.int64)
     order = np.random.default_rng(seed).permutation(len(key))

@@ -12,7 +12,7 @@ import numpy as np
 from ..paper.p_square import PSquare, Summary
 from .exact import Exact
 
-__all__ = ["Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
+__all__ = ["Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator", "summaries"]
 
 
 class Estimator(Protocol):
