@@ -240,12 +240,14 @@ class Pixels:
 class Instance:
     """One object of the room; `object_id` is what the mesh's faces carry.
 
-    It is a `guess` where the mesh's shape alone gives it: it may hold things of several materials.
+    It is a `guess` where the mesh's shape alone gives it: it may hold things of several materials. Where it is
+    `part_of` another one, it is the same thing to the artist, with a material of its own: a slot of that object.
     """
 
     object_id: int
     class_name: str
     guess: bool = False
+    part_of: int | None = None
 
     @property
     def name(self) -> str:
