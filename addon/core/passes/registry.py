@@ -80,6 +80,7 @@ PASSES = (
         missing_light="Solves for clipped patches, and for what comes in by openings, where albedos are above 1.",
         sun="Solves for a sun that no frame sees from the patch of light that it makes.",
         seen_sun="Takes a sun that frames see out of the environment map and treats it by itself.",
+        material_parts="Sets apart connected pieces of an object that look unlike the rest of it.",
         mirrors="Finds flat mirrors and follows light over them.",
         emitter_rays="Aims rays at bright triangles.",
         portal_rays="Aims rays at the openings to the outside.",

@@ -18,6 +18,7 @@ from ..light.sun import Sun, extract_sun
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.patches import clipped_patches
+from ..passes.material_parts.material_parts import connected_pieces, unlike_pieces
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..progress import Progress
@@ -81,6 +82,9 @@ def find_shading(
         )
         panes = mirror_patches(field, observed.samples)
         patches, surface = Patches.together([patches, panes]), panes.surface(surface)
+    if not parts_guessed and "material-parts" not in s.without:
+        patches = connected_pieces(surface.mesh, surface.atlas, lit_diffuse.seen)
+        surface = patches.surface(surface)
     capture = patches.capture(capture)
 
     def shaded(lit_diffuse: LitDiffuse, shining: Collection[int] = ()) -> Shading:
@@ -94,13 +98,17 @@ def find_shading(
         shading = shaded(lit_diffuse)
     else:
         shading = shade_clipped(shaded, lit_diffuse, surface.atlas, patches.lamps)
-    return with_patches_of(shading, patches)
+    sources = shading.emitters | {mirror.object_id for mirror in shading.mirrors}
+    if len(patches.parts):
+        groups = unlike_pieces(patches, whole, surface.atlas, lit_diffuse, shading.irradiance, sources)
+    else:
+        groups = [[i] for i in patches.objects if i in sources]
+    return with_patches_of(shading, patches, groups)
 
 
-def with_patches_of(shading: Shading, patches: Patches) -> Shading:
-    """A `Shading` found with `patches` set apart: those that are no lamps or mirrors go back to their objects."""
-    mirrors = {mirror.object_id for mirror in shading.mirrors}
-    chosen, number = patches.subset(set(patches.objects) & (shading.emitters | mirrors))
+def with_patches_of(shading: Shading, patches: Patches, groups: list[list[int]]) -> Shading:
+    """A `Shading` found with `patches` set apart: those that are in no group go back to their objects."""
+    chosen, number = patches.grouped(groups)
 
     def renumbered(sources: Any) -> tuple:
         return tuple(replace(source, object_id=number.get(source.object_id, source.object_id)) for source in sources)

@@ -1,7 +1,8 @@
-"""Triangles that were found to be objects of their own, though the capture has them as parts of others."""
+"""Triangles that were found to be objects or materials of their own, though the capture has them as parts of others."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -29,11 +30,14 @@ class Patches:
         The object that each is of now.
     mirrors : (m,) int32
         Those of the new objects that may be mirrors; the others may be lamps.
+    parts : (k,) int32
+        Those that are the same thing as before, of another material (`Instance.part_of`).
     """
 
     triangle: np.ndarray
     object_id: np.ndarray
     mirrors: np.ndarray = field(default_factory=_nothing)
+    parts: np.ndarray = field(default_factory=_nothing)
 
     def __len__(self) -> int:
         return len(self.triangle)
@@ -56,15 +60,19 @@ class Patches:
     @property
     def lamps(self) -> list[int]:
         """Those of them that may be lamps."""
-        return [i for i in self.objects if i not in self.mirrors]
+        return [i for i in self.objects if i not in self.mirrors and i not in self.parts]
 
-    def subset(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
-        """Those of some objects alone, numbered without gaps; and the new number of each."""
-        numbers = dict(zip(sorted(objects), self.objects, strict=False))
+    def grouped(self, groups: Iterable[Sequence[int]]) -> tuple[Patches, dict[int, int]]:
+        """Some of the objects alone, each group as one, numbered without gaps; and the new number of each."""
+        group_of = {old: group for group, members in enumerate(groups) for old in members}
+        numbers = {old: min(self.objects, default=0) + group for old, group in group_of.items()}
         chosen = np.isin(self.object_id, list(numbers))
-        new = np.array([numbers[int(i)] for i in self.object_id[chosen]], np.int32)
-        mirrors = np.array([numbers[int(i)] for i in self.mirrors if i in numbers], np.int32)
-        return Patches(self.triangle[chosen], new, mirrors), numbers
+
+        def renumbered(ids: np.ndarray) -> np.ndarray:
+            return np.array([numbers[int(i)] for i in ids if int(i) in numbers], np.int32)
+
+        mirrors, parts = np.unique(renumbered(self.mirrors)), np.unique(renumbered(self.parts))
+        return Patches(self.triangle[chosen], renumbered(self.object_id[chosen]), mirrors, parts), numbers
 
     def mesh(self, mesh: Mesh) -> Mesh:
         """A mesh with them set apart; it may lack the second sides (`Mesh.backs`)."""
@@ -85,12 +93,29 @@ class Patches:
 
     def capture(self, capture: Capture) -> Capture:
         """A capture with them set apart; as it is where they are already."""
-        known_ids = {instance.object_id for instance in capture.instances}
+        known = {instance.object_id: instance for instance in capture.instances}
         classes = dict.fromkeys(self.objects, LAMP) | dict.fromkeys(self.mirrors.tolist(), MIRROR)
-        new = tuple(Instance(i, name, guess=True) for i, name in classes.items() if i not in known_ids)
+        parts = self._parts(capture.mesh, known)
+        new = tuple(parts.get(i, Instance(i, name, guess=True)) for i, name in classes.items() if i not in known)
         if not new:
             return capture
         mesh = self.mesh(capture.mesh)
         remaining = set(np.unique(mesh.object_id).tolist())
         instances = (*(instance for instance in capture.instances if instance.object_id in remaining), *new)
         return replace(capture, mesh=mesh, instances=instances)
+
+    def _parts(self, mesh: Mesh, known: dict[int, Instance]) -> dict[int, Instance]:
+        """Instances of the parts. The second parts of all chairs are a class, as what those are made of says nothing of
+        the first."""
+        new, first = np.unique(self.object_id, return_index=True)
+        instances: dict[int, Instance] = {}
+        of_whole: Counter[int] = Counter()
+        for i, triangle in zip(new.tolist(), self.triangle[first], strict=True):
+            if i in self.parts and i not in known:
+                whole = known[int(mesh.object_id[triangle])]
+                of_whole[whole.object_id] += 1
+                name = f"{whole.class_name} part {1 + of_whole[whole.object_id]}"
+                instances[i] = Instance(
+                    i, name, whole.guess, whole.object_id if whole.part_of is None else whole.part_of
+                )
+        return instances

@@ -108,5 +108,5 @@ def test_patches_together_and_kept():
     mirrors = Patches(np.array([1, 9], np.int32), np.array([8, 9], np.int32), np.array([8, 9], np.int32))
     both = Patches.together([lamps, mirrors])
     assert both.objects == [7, 8, 9] and both.lamps == [7]
-    kept, number = both.subset({9})
+    kept, number = both.grouped([[9]])
     assert number == {9: 7} and kept.mirrors.tolist() == [7] and kept.triangle.tolist() == [9]

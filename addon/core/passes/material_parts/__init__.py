@@ -1,0 +1,1 @@
+"""Objects of several materials: their connected pieces set apart where they look unlike the rest."""

@@ -1,0 +1,98 @@
+"""Objects of several materials: a cupboard with its handles, a table with its cloth.
+
+Scans are often segmented by the names of things, so that one object has wood and steel. Its connected pieces are set
+apart while the light is found, so that each may be a lamp or a mirror. Afterwards those that look alike are put
+together again: whose medians of log(pi L_d / E) differ by no more than their spreads explain. What remains apart has a
+model, lobe and prior of its own.
+
+Measured on the living room and a kitchen whose objects were put together by what touches (64 objects to 20, 283 to 34;
+`docs/benchmark/material_parts.md`).
+"""
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from ...groups import by_number
+from ...scene.atlas import Atlas
+from ...scene.connected_parts import connected_parts
+from ...scene.lit_diffuse import LitDiffuse
+from ...scene.model import Mesh
+from ...scene.patches import Patches
+from ...significance import LEVELS, SIGMA_OF_MAD
+
+
+def connected_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
+    """Each object's connected pieces that enough `seen` elements ((n,) bool) show, but for the greatest of them."""
+    count = np.bincount(atlas.triangle[seen], minlength=len(mesh.triangles))
+    next_id, pieces = int(mesh.object_id.max()) + 1, [Patches.none()]
+    for triangles in by_number(mesh.object_id).values():
+        if count[triangles].sum() < LEVELS.few:
+            continue
+        piece = connected_parts(mesh.vertices, mesh.triangles[triangles])
+        seen_count = np.bincount(piece, count[triangles])
+        seen_count[np.argmax(seen_count)] = 0
+        for number in np.flatnonzero(seen_count >= LEVELS.few):
+            triangle = triangles[piece == number].astype(np.int32)
+            ids = np.full(len(triangle), next_id, np.int32)
+            pieces.append(Patches(triangle, ids, parts=np.array([next_id], np.int32)))
+            next_id += 1
+    return Patches.together(pieces)
+
+
+class _Look(NamedTuple):
+    """Median (3,) and robust standard deviation of an object's log(pi L_d / E)."""
+
+    median: np.ndarray
+    spread: float
+
+    def alike(self, other: "_Look") -> bool:
+        """Whether two may be of one material."""
+        tolerance = LEVELS.likely * np.hypot(self.spread, other.spread)
+        return bool(np.abs(self.median - other.median).max() <= max(tolerance, LEVELS.gain))
+
+
+def unlike_pieces(
+    pieces: Patches,
+    whole: np.ndarray,
+    atlas: Atlas,
+    lit_diffuse: LitDiffuse,
+    irradiance: np.ndarray,
+    sources: Collection[int],
+) -> list[list[int]]:
+    """Groups of pieces that stay apart, each of one material; what is alike to the greatest piece is in none.
+
+    Parameters
+    ----------
+    whole : (n,) int
+        The object of each element as the capture has it.
+    irradiance : (n, 3) float32
+    sources : collection of int
+        Lamps and mirrors, which stay by themselves.
+    """
+    usable = lit_diffuse.seen & (irradiance.min(1) > 0) & (lit_diffuse.radiance.min(1) > 0)
+    elements = by_number(np.where(usable, atlas.object_id, -1))
+    is_piece = np.isin(atlas.object_id, pieces.parts)
+    groups = [[piece] for piece in pieces.objects if piece in sources]
+    for parent, members in by_number(np.where(is_piece, whole, -1)).items():
+        if parent < 0:
+            continue
+        ids = [parent, *np.unique(atlas.object_id[members]).tolist()]
+        ids = [i for i in ids if i not in sources and len(elements.get(i, ())) >= LEVELS.few]
+        found: list[tuple[_Look, list[int]]] = []
+        for i in sorted(ids, key=lambda i: (i != parent, -len(elements[i]))):
+            look = _look(lit_diffuse.radiance[elements[i]], irradiance[elements[i]])
+            group = next((group for first, group in found if first.alike(look)), None)
+            if group is None:
+                found.append((look, [i]))
+            else:
+                group.append(i)
+        groups += [group for _, group in found if parent not in group]
+    return groups
+
+
+def _look(radiance: np.ndarray, irradiance: np.ndarray) -> _Look:
+    log_albedo = np.log(np.pi * radiance / irradiance)
+    median = np.median(log_albedo, 0)
+    return _Look(median, SIGMA_OF_MAD * float(np.median(np.abs(log_albedo - median), 0).mean()))
