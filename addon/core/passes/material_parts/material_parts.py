@@ -2,17 +2,17 @@
 
 Scans are often segmented by the names of things, so that one object has wood and steel. Its connected pieces are set
 apart while the light is found, so that each may be a lamp or a mirror. Afterwards those that look alike are put
-together again: whose medians of log(pi L_d / E) differ by no more than their spreads explain. What remains apart has a
-model, lobe and prior of its own.
+together again: whose distributions of log(pi L_d / E) overlap by half. What remains apart has a model, lobe and prior
+of its own.
 
 Measured on the living room and a kitchen whose objects were put together by what touches (64 objects to 20, 283 to 34;
 `docs/benchmark/material_parts.md`).
 """
 
 from collections.abc import Collection
-from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import ks_2samp
 
 from ...groups import by_number
 from ...scene.atlas import Atlas
@@ -20,7 +20,7 @@ from ...scene.connected_parts import connected_parts
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Mesh
 from ...scene.patches import Patches
-from ...significance import LEVELS, SIGMA_OF_MAD
+from ...significance import LEVELS
 
 
 def connected_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
@@ -39,18 +39,6 @@ def connected_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
             pieces.append(Patches(triangle, ids, parts=np.array([next_id], np.int32)))
             next_id += 1
     return Patches.together(pieces)
-
-
-class _Look(NamedTuple):
-    """Median (3,) and robust standard deviation of an object's log(pi L_d / E)."""
-
-    median: np.ndarray
-    spread: float
-
-    def alike(self, other: "_Look") -> bool:
-        """Whether two may be of one material."""
-        tolerance = LEVELS.likely * np.hypot(self.spread, other.spread)
-        return bool(np.abs(self.median - other.median).max() <= max(tolerance, LEVELS.gain))
 
 
 def unlike_pieces(
@@ -75,24 +63,32 @@ def unlike_pieces(
     elements = by_number(np.where(usable, atlas.object_id, -1))
     is_piece = np.isin(atlas.object_id, pieces.parts)
     groups = [[piece] for piece in pieces.objects if piece in sources]
+
+    def log_albedo(i: int) -> np.ndarray:
+        return np.log(np.pi * lit_diffuse.radiance[elements[i]] / irradiance[elements[i]])
+
     for parent, members in by_number(np.where(is_piece, whole, -1)).items():
         if parent < 0:
             continue
         ids = [parent, *np.unique(atlas.object_id[members]).tolist()]
         ids = [i for i in ids if i not in sources and len(elements.get(i, ())) >= LEVELS.few]
-        found: list[tuple[_Look, list[int]]] = []
+        found: list[list[int]] = []
         for i in sorted(ids, key=lambda i: (i != parent, -len(elements[i]))):
-            look = _look(lit_diffuse.radiance[elements[i]], irradiance[elements[i]])
-            group = next((group for first, group in found if first.alike(look)), None)
+            group = next((group for group in found if _alike(log_albedo(group[0]), log_albedo(i))), None)
             if group is None:
-                found.append((look, [i]))
+                found.append([i])
             else:
                 group.append(i)
-        groups += [group for _, group in found if parent not in group]
+        groups += [group for group in found if parent not in group]
     return groups
 
 
-def _look(radiance: np.ndarray, irradiance: np.ndarray) -> _Look:
-    log_albedo = np.log(np.pi * radiance / irradiance)
-    median = np.median(log_albedo, 0)
-    return _Look(median, SIGMA_OF_MAD * float(np.median(np.abs(log_albedo - median), 0).mean()))
+def _alike(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two pieces may be of one material, by the log albedo of their elements, (p, 3) and (q, 3).
+
+    Medians alone don't tell: what L_d / E is of a metal varies with what it mirrors. Kolmogorov and Smirnov's statistic
+    is above a half where most of one lies beyond most of the other.
+    """
+    if np.abs(np.median(a, 0) - np.median(b, 0)).max() <= LEVELS.gain:  # E errs by as much
+        return True
+    return max(float(ks_2samp(x, y, method="asymp").statistic) for x, y in zip(a.T, b.T, strict=True)) <= 0.5
