@@ -99,6 +99,9 @@ class Recovery(Corrected):
         }
         for number, name in (self.parts.images if self.parts else {}).items():
             details.setdefault(number, {})["image"] = name
+        for instance in self.capture.instances:
+            if instance.part_of is not None:
+                details.setdefault(instance.object_id, {})["part_of"] = instance.part_of
         objects = [{"name": m.name} | m.as_dict() | details.get(m.object_id, {}) for m in self.materials()]
         materials = {
             "run": self.run_key,

@@ -151,6 +151,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         "shading_points": shading.points,
         "lamps": [lamp.object_id for lamp in shading.lamps],
         "mirrors": [mirror.object_id for mirror in shading.mirrors],
+        "parts": shading.patches.parts.tolist(),
     }
     if shading.openings is not None:
         figures["unknown_light_share"] = float(shading.openings.share)
