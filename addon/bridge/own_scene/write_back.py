@@ -19,11 +19,11 @@ from mathutils import Matrix
 from ...core.brdf.material import ObjectMaterial, undescribed
 from ...core.errors import BadInputError, MissingStageError
 from ...core.results.room_file import run_of
-from ...core.scene.model import Capture
+from ...core.scene.model import Capture, Instance
 from ..custom_properties import BEFORE, OBJECT_ID, set_run
 from ..data.arrays import faces_of, read, set_layer
 from ..data.materials import make_material
-from ..data.mesh_objects import ATLAS_UV
+from ..data.mesh_objects import ATLAS_UV, by_object
 from ..data.unwrap import Polygons
 from ..light.room import depsgraph_of
 from ..refused import sentences
@@ -85,6 +85,8 @@ def writing_back(
     base_color = images.load_baked(result_folder, where)
     corner_uv, torn = corner_uvs(polygons, atlas_uv)
     descriptions = {material.object_id: material for material in materials}
+    slots = {source.object_id: source.slot for source in captured}
+    instances = by_object(capture.mesh, capture.instances)
     assignment = _Assignment(scene, Path(result_folder).absolute(), base_color)
     missing, edited, generated, linked, torn_names = [], [], [], [], []
     for done, source in enumerate(captured):
@@ -98,7 +100,9 @@ def writing_back(
         if obj.library or obj.override_library:
             linked.append(source.whole)
             continue
-        parts = _parts(source, captured, capture, polygons, descriptions)
+        parts = _parts(
+            source, instances.get(source.object_id, []), slots, capture.mesh.object_id, polygons, descriptions
+        )
         object_uv = corner_uv[source.corner_start :]
         if not source.own:
             generated.append((source, obj, parts, object_uv))
@@ -157,23 +161,23 @@ class _Parts:
 
 
 def _parts(
-    main: Source, captured: Iterable[Source], capture: Capture, polygons: Polygons, descriptions: dict
+    main: Source,
+    instances: list[Instance],
+    slot_of: dict,
+    object_id: np.ndarray,
+    polygons: Polygons,
+    descriptions: dict,
 ) -> _Parts:
-    """The parts of an object whose main part is `main`: as captured, and those that the run itself has found."""
-    slot_of = {main.object_id: main.slot}
-    slot_of |= {source.object_id: source.slot for source in captured if source.part_of == main.object_id}
-    found = [instance for instance in capture.instances if instance.part_of == main.object_id]
-    names = {instance.object_id: instance.name for instance in capture.instances}
-    ids = list(dict.fromkeys([*slot_of, *(instance.object_id for instance in found)]))
-    materials = [descriptions.get(i) or undescribed(i, names.get(i, main.name)) for i in ids]
-    slots = [slot_of.get(i) for i in ids]
-    by_slot = main.own and all(slot is not None for slot in slots)
+    """The parts of the object whose main part is `main`: as captured, and those that the run itself has found."""
+    names = {main.object_id: main.name} | {instance.object_id: instance.name for instance in instances}
+    materials = [descriptions.get(i) or undescribed(i, name) for i, name in names.items()]
+    slots = [slot_of.get(i) for i in names]
     # Faces without a triangle show nothing; they stay with the main part.
     first = int(np.searchsorted(polygons.start, main.corner_start))
     part = np.zeros(len(polygons.start) - 1 - first, np.int32)
-    for index, object_id in enumerate(ids[1:], 1):
-        part[polygons.face[capture.mesh.object_id == object_id] - first] = index
-    return _Parts(materials, slots if by_slot else None, part)
+    for index, i in enumerate(names):
+        part[polygons.face[object_id == i] - first] = index
+    return _Parts(materials, slots if main.own and None not in slots else None, part)
 
 
 class _Assignment:
