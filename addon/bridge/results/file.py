@@ -120,11 +120,12 @@ def rows(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str
 
 def rows_of_parts(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[int, dict[str, Any]]]:
     """The entries of each object's instances, by `object_id`, where its run is the one in its folder."""
-    return {
+    found = {
         obj: {i: result.objects[i] for i in slots_of(obj) if i in result.objects}
         for obj, (state, result) in result_states(objects).items()
         if state == FITS
     }
+    return {obj: parts for obj, parts in found.items() if parts}
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
