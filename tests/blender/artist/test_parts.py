@@ -147,3 +147,32 @@ def test_undo_takes_back_what_was_said_of_a_part(ops, board):
     bpy.ops.ed.undo()
     board = bpy.data.objects[name]
     assert values(board, 1) == before and bridge("corrections.corrections").given(board, TABLE) == {}
+
+
+def test_the_panel_shows_the_parts_and_the_values_of_the_active_slot(board):
+    from types import SimpleNamespace
+
+    from tests.blender.panel.conftest import Layout
+
+    class Listing(Layout):
+        lists: list = []
+
+        def template_list(self, *arguments, **_):
+            self.lists.append(arguments)
+
+    panels = importlib.import_module("scan_relight.operators.results.panel")
+
+    def drawn():
+        layout, cls = Listing(), panels.SCAN_RELIGHT_PT_results
+        layout.lists.clear()
+        panel = SimpleNamespace(layout=layout, say=cls.say)
+        panel.details = cls.details.__get__(panel)
+        cls.draw(panel, SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, region=None))
+        return layout
+
+    layout = drawn()
+    assert layout.lists[1][0] == "SCAN_RELIGHT_UL_parts"
+    assert layout.lists[1][2:] == (board, "material_slots", board, "active_material_index")
+    assert "Diffuse" in layout.text and "Glossy" not in layout.text
+    board.active_material_index = 1
+    assert "Glossy" in drawn().text and board.material_slots[1].material.name in drawn().text
