@@ -113,6 +113,7 @@ def test_there_and_back(ops, room, tmp_path):
         assert state({name: thing})[name]["indices"] == before[name]["indices"]
         assert state({name: thing})[name]["corners"] == before[name]["corners"]
     assert room["chair"].data != room["chair.001"].data
+    assert len({slot.material for slot in room["table"].material_slots}) == 3  # each slot is a part
     old = bpy.data.materials["red"]
     assert ops.restore_materials() == {"FINISHED"}
     assert state(room) == before

@@ -150,3 +150,27 @@ def test_an_edited_mesh_keeps_its_parts(scene, first, tmp_path):
     assert "the mesh was edited" in brought.warnings[0]
     assert [face.material_index for face in table.data.polygons] == indices
     assert principled(material_of(scene, LEG))["Roughness"].default_value == pytest.approx(0.25)
+
+
+def test_an_export_has_a_plain_material_for_each_part(scene, first, tmp_path):
+    from addon.bridge.export.export import copies
+
+    whole(bringing(first, scene))
+    with copies(scene, [scene.objects["Table 4"]], [], tmp_path / "textures") as collection:
+        [table] = collection.objects
+        assert [slot.material.name for slot in table.material_slots] == ["Table 4", "Shade 6", "Leg 9"]
+        assert not any("scan_relight_model" in slot.material for slot in table.material_slots)
+
+
+def test_a_lamp_in_a_slot_shines_from_its_own_faces(scene, first):
+    """As on an artist's own object: the legs, 2 m to the side, give the light."""
+    from mathutils import Vector
+
+    from addon.bridge.data.materials import dress
+    from addon.bridge.relight import estimate
+
+    whole(bringing(first, scene))
+    leg = material_of(scene, LEG)
+    dress(leg, ObjectMaterial(LEG, "Leg", EMITTER, emission=(2.0, 2.0, 2.0)))
+    samples = list(estimate._lamp_source(scene, leg.name)(Vector((2.5, 0.5, 1))))
+    assert samples and all(abs((Vector((2.5, 0.5, 1)) + d * r).x - 2.5) <= 0.5 for d, r, _ in samples)
