@@ -6,7 +6,10 @@ They need no registered add-on, so that a file keeps its meaning where the exten
 from pathlib import Path
 
 OBJECT_ID = "object_id"
-"""Of an object (int): which instance of the capture it is."""
+"""Of an object (int): which instance of the capture it is. Of a recovered material: which part of that, where the
+object has several; the main one's has none."""
+BEFORE = "scan_relight_before"
+"""Of an object of the artist's own scene: its original materials, mesh or copies."""
 CAPTURE = "scan_relight_capture"
 """Of a room's collection: the folder of the capture that it came from."""
 RESULT = "scan_relight_result"

@@ -6,7 +6,9 @@ import bpy
 from mathutils import Vector
 
 from ...addon.bridge.corrections import corrections, known_white, refitted, unseen
+from ...addon.bridge.corrections.smooth import smooth
 from ...addon.bridge.custom_properties import OBJECT_ID
+from ...addon.bridge.data.instances import chosen_in, name_of
 from ...addon.bridge.job import job as jobs
 from ...addon.bridge.job.command import command
 from ...addon.bridge.light.room import cast, depsgraph_of
@@ -163,15 +165,18 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
         other = context.view_layer.objects.active if len(objects) > 1 else context.scene.scan_relight_correct.like
         if self.object_id >= 0:
             other = corrections.by_id(objects[0], self.object_id)
-        if not corrections.correctable(other):
+        if not corrections.correctable(other, self.object_id if self.object_id >= 0 else None):
             raise BadInputError("The other object is none of this room's recovered objects; choose one of those.")
-        others = [obj for obj in objects if obj != other]
+        like = self.object_id if self.object_id >= 0 else chosen_in(other)
+        others = [obj for obj in objects if (obj, chosen_in(obj)) != (other, like)]
         if not others:
-            raise BadInputError(f"'{other.name}' is the other object itself; select the ones that are like it.")
+            raise BadInputError(
+                f"'{name_of(other, like)}' is the other object itself; select the ones that are like it."
+            )
         if corrections.result_folder(other) != corrections.folder_for(others):
             raise BadInputError(f"'{other.name}' belongs to another result; choose an object of the same room.")
         for obj in others:
-            corrections.give(obj, same_as=other[OBJECT_ID])
+            corrections.give(obj, same_as=like)
         return others
 
 
@@ -227,7 +232,7 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
         objects = list(objects)
         if not objects:
             raise BadInputError("No recovered object is selected; select some, or choose the whole room.")
-        count = corrections.smooth(objects, self.angle)
+        count = smooth(objects, self.angle)
         return [f"{count} object{'s' * (count != 1)} shaded {'smooth' if self.angle else 'flat'}"]
 
 
@@ -247,7 +252,7 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
         corrections.say_white(obj, self.albedo)
         self.report(
             {"INFO"},
-            f"The whole room's albedo is scaled so that '{obj.name}' has "
+            f"The whole room's albedo is scaled so that '{name_of(obj)}' has "
             f"{', '.join(f'{channel:.2f}' for channel in self.albedo)}",
         )
         return [obj]
@@ -308,11 +313,13 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
 
     def state(self, context, objects):
         hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
+        if hit is not None and OBJECT_ID in hit.obj:
+            hit.obj.active_material_index = hit.slot
         if hit is None or not corrections.correctable(hit.obj):
             raise BadInputError("There is no recovered object at that spot; click on one.")
         albedo = known_white.of_object(hit.obj, hit.location, tuple(self.albedo), depsgraph_of(context.scene))
         corrections.say_white(hit.obj, albedo)
-        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.obj.name}'")
+        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{name_of(hit.obj)}'")
         return [hit.obj]
 
     def _end(self, context) -> None:

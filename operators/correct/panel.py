@@ -3,6 +3,7 @@
 import bpy
 
 from ...addon.bridge.corrections import corrections, unseen
+from ...addon.bridge.data.instances import name_of
 from ...addon.core.brdf.registry import find_or_lambertian, named
 from ...addon.core.photo import MIDDLE_GREY
 from ..base.job_operator import active, bar
@@ -32,7 +33,8 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         layout, obj = self.layout, the_object(context)
         choices, objects = context.scene.scan_relight_correct, chosen(context)
         others = len([other for other in objects if other != obj])
-        layout.label(text=f"{obj.name} and {others} more" if others else obj.name, icon="OBJECT_DATA", translate=False)
+        name = name_of(obj)
+        layout.label(text=f"{name} and {others} more" if others else name, icon="OBJECT_DATA", translate=False)
         self.statements(layout, context, choices, obj)
         self.values(layout, obj)
         if others:
@@ -53,9 +55,10 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         row.prop(choices, "like", text="", icon="OBJECT_DATA")
         row.operator("scan_relight.same_as", text="The Same As")
         if given.get("same_as") is not None:
-            other = corrections.by_id(obj, given["same_as"])
+            like = given["same_as"]
+            other = corrections.by_id(obj, like)
             row = layout.row(align=True)
-            row.label(text=f"The same as {other.name if other else given['same_as']}", icon="PINNED", translate=False)
+            row.label(text=f"The same as {name_of(other, like) if other else like}", icon="PINNED", translate=False)
             row.operator("scan_relight.take_back", text="", icon="LOOP_BACK").key = "same_as"
 
     def values(self, layout, obj) -> None:
@@ -125,7 +128,7 @@ class SCAN_RELIGHT_PT_correct_scale(CorrectPart, bpy.types.Panel):
         if white is not None:
             row = layout.row(align=True)
             row.label(
-                text=f"{white[0].name}: {', '.join(f'{channel:.2f}' for channel in white[1])}",
+                text=f"{name_of(*white[:2])}: {', '.join(f'{channel:.2f}' for channel in white[2])}",
                 icon="PINNED",
                 translate=False,
             )

@@ -92,7 +92,7 @@ class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
 
 
 def _has_restorable(context) -> bool:
-    from ...addon.bridge.own_scene.write_back import restorable
+    from ...addon.bridge.own_scene.restore import restorable
 
     return bool(restorable(context.scene.objects))
 
@@ -111,7 +111,7 @@ class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
     )
 
     def work(self, context):
-        from ...addon.bridge.own_scene.write_back import restore
+        from ...addon.bridge.own_scene.restore import restore
 
         count, warnings = restore(list(context.selected_objects if self.selected_only else context.scene.objects))
         look.refresh(context.scene)

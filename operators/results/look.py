@@ -2,7 +2,7 @@
 
 import bpy
 
-from ...addon.bridge.custom_properties import OBJECT_ID
+from ...addon.bridge.data.instances import choose, slots_of
 from ...addon.bridge.results import look
 from ...addon.core.errors import BadInputError
 from ..base.operator import AtOnce, has_scene, needs, object_mode
@@ -30,7 +30,7 @@ def select(context, obj: bpy.types.Object, extend: bool = False) -> None:
 @object_mode
 @has_scene
 class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
-    """Select this object in the scene"""
+    """Select this object in the scene; of a part, its material slot becomes the active one"""
 
     bl_label = "Select Object"
 
@@ -39,10 +39,11 @@ class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
 
     def work(self, context):
         meshes = (obj for obj in context.scene.objects if obj.type == "MESH")
-        matches = [obj for obj in meshes if obj.get(OBJECT_ID) == self.object_id]
+        matches = [obj for obj in meshes if self.object_id in slots_of(obj)]
         if not matches:
             raise BadInputError(f"Object {self.object_id} is not in this scene; import the capture first.")
         select(context, matches[-1], self.extend)  # from the last of several imports
+        choose(matches[-1], self.object_id)
 
 
 LOOKS = [(name, entry.label, entry.text) for name, entry in look.LOOKS.items()]

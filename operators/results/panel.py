@@ -1,10 +1,12 @@
 """The tab's third part: findings on each object, their certainty, and the stages of the run."""
 
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
 import bpy
 
+from ...addon.bridge.data.instances import chosen_in, in_slot, name_of
 from ...addon.bridge.results import file
 from ...addon.console import duration
 from ...addon.core.brdf.registry import find, models
@@ -31,22 +33,32 @@ ORDERS = [
 ]
 
 
-class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
-    """The recovered objects; the rows are the scene's own objects, so none of this is saved."""
+class ResultRows(NamedRows):
+    """A list with what was found in each row."""
+
+    def row(self, layout, name: str, entry: dict) -> None:
+        """Draw a row: name, roughness, F0 and certainty."""
+        text = "  ".join(filter(None, columns(entry)))
+        split = layout.split(factor=NAME if text else 0.9)  # long names may use the empty space
+        self.name(split, name, getattr(find(entry.get("model")), "icon", "BLANK1"))
+        row = split.row()
+        if text:
+            row.label(text=text, translate=False)  # one label: the margins of two would leave no space for numbers
+        row.label(text="", icon=SIGNS[results.certainty(entry)])
+
+
+class SCAN_RELIGHT_UL_results(ResultRows, bpy.types.UIList):
+    """The recovered objects; the rows are the scene's own objects, so none of this is saved.
+
+    An object with parts is listed by the least sure of those that pass the filter.
+    """
 
     entries: dict = {}  # by name; result of the last `filter_items`, which runs before the rows are drawn
     model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
     order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
-        entry = self.entries.get(item.name, {})
-        text = "  ".join(filter(None, columns(entry)))
-        split = layout.split(factor=NAME if text else 0.9)  # long names may use the empty space
-        self.name(split, item.name, getattr(find(entry.get("model")), "icon", "BLANK1"))
-        row = split.row()
-        if text:
-            row.label(text=text, translate=False)  # one label: the margins of two would leave no space for numbers
-        row.label(text="", icon=SIGNS[results.certainty(entry)])
+        self.row(layout, item.name, self.entries.get(item.name, {}))
 
     def draw_filter(self, context, layout):
         layout.prop(self, "filter_name", text="", icon="VIEWZOOM")
@@ -57,15 +69,32 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
     def filter_items(self, context, data, property):
         """Only recovered objects that pass the filters, in the chosen order."""
         objects = getattr(data, property)
-        entries = type(self).entries = {obj.name: entry for obj, entry in file.rows(objects).items()}
+        entries = type(self).entries = {
+            obj.name: entry
+            for obj, parts in file.rows_of_parts(objects).items()
+            if (entry := least_sure(parts.values(), self.model)) is not None
+        }
         flags, keys = [], []
         for obj in objects:
             entry = entries.get(obj.name)
-            listed = entry is not None and self.model in ("ALL", entry.get("model"))
-            listed = listed and self.filter_name.lower() in obj.name.lower()
+            listed = entry is not None and self.filter_name.lower() in obj.name.lower()
             flags.append(self.bitflag_filter_item if listed else 0)
             keys.append(order_key(obj.name, entry or {}, self.order))
         return flags, places(keys)
+
+
+class SCAN_RELIGHT_UL_parts(ResultRows, bpy.types.UIList):
+    """The material slots of an object with parts, as Blender lists them; an empty row shows nothing recovered."""
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
+        entry = file.rows_of_parts([data]).get(data, {}).get(in_slot(data, index), {})
+        self.row(layout, item.material.name if item.material else "", entry)
+
+
+def least_sure(parts: Iterable[dict], model: str = "ALL") -> dict | None:
+    """The entry of the least sure part of those of a model; None without any."""
+    fitting = [entry for entry in parts if model in ("ALL", entry.get("model"))]
+    return max(fitting, key=lambda entry: results.interval_width(entry) or 0.0, default=None)
 
 
 def order_key(name: str, entry: dict, order: str) -> tuple:
@@ -123,7 +152,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout, scene = self.layout, context.scene
-        rows, refused = file.rows(scene.objects), results.refused(scene.objects)
+        rows, refused = file.rows_of_parts(scene.objects), results.refused(scene.objects)
         for sentence, folder in refused:
             self.say(layout, sentence, "ERROR")
             self.bring_in(layout, scene, folder)
@@ -148,9 +177,16 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                 "INFO",
             )
         obj = results.active(scene)
-        entry = rows.get(obj)
-        if entry is not None:
-            self.details(layout.box(), context, obj.name, entry)
+        parts = rows.get(obj, {})
+        if len(parts) > 1:
+            layout.label(text="Parts")
+            layout.template_list(
+                "SCAN_RELIGHT_UL_parts", "", obj, "material_slots", obj, "active_material_index", rows=len(parts)
+            )
+        if parts:
+            entry = parts.get(chosen_in(obj))
+            if entry is not None:
+                self.details(layout.box(), context, name_of(obj), entry)
         layout.operator("scan_relight.open_report", icon="URL")
 
     def bring_in(self, layout, scene, folder: Path | None) -> None:

@@ -1,11 +1,13 @@
 """What the artist says of recovered objects: kept with them, shown at once, written beside the result for a refit.
 
-An object's property `custom_properties.GIVEN` holds it, so that it is saved and undone with the scene. The result
-folder's `overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
+An object's property `custom_properties.GIVEN` holds it, so that it is saved and undone with the scene; a part's has the
+part's number (`data.instances.key_of`). Functions that take `object_id` are about that instance of the object, by
+default about that of its active material slot. The result folder's `overrides.json`, which runs heed, is brought in
+line with the scene whenever a run or refit begins (`keep`).
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +21,12 @@ from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ...core.results.result_folders import write_capture
 from ..custom_properties import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
+from ..data.instances import chosen_in, key_of, name_of, slots_of
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
 from . import material, unseen
 from .material import entry
+from .smooth import shade
 from .unseen import room_of
 
 ROUGHNESS: Shown[float] = 0.3
@@ -32,14 +36,14 @@ _written: dict[Path, set[int | str]] = {}
 """Objects, by result folder, whose entries in its overrides.json come from this session's scenes: undo reaches them."""
 
 
-def correctable(obj: bpy.types.Object | None) -> bool:
+def correctable(obj: bpy.types.Object | None, object_id: int | None = None) -> bool:
     """Whether an object wears a recovered material that can be changed."""
     return (
         obj is not None
         and obj.type == "MESH"
         and OBJECT_ID in obj
         and not obj.library
-        and material.worn_material(obj) is not None
+        and material.worn_material(obj, object_id) is not None
     )
 
 
@@ -56,18 +60,19 @@ def made_by(folder: Path) -> dict[int, dict[str, Any]]:
     return dict(result.objects) if result else {}
 
 
-def given(obj: bpy.types.Object) -> dict[str, Any]:
+def given(obj: bpy.types.Object, object_id: int | None = None) -> dict[str, Any]:
     """What is given of an object: by the artist here, else by the overrides that its run was made with."""
-    if GIVEN not in obj:
-        return dict(entry(obj).get("given") or {})
+    key = key_of(GIVEN, obj, object_id)
+    if key not in obj:
+        return dict(entry(obj, object_id).get("given") or {})
     try:
-        value = json.loads(obj[GIVEN])
+        value = json.loads(obj[key])
     except (TypeError, ValueError):
         return {}
     return value if isinstance(value, dict) else {}
 
 
-def give(obj: bpy.types.Object, **values) -> None:
+def give(obj: bpy.types.Object, object_id: int | None = None, **values) -> None:
     """Override values of an object's material and show the result.
 
     Parameters
@@ -83,26 +88,38 @@ def give(obj: bpy.types.Object, **values) -> None:
     BadInputError
         A value is impossible, or `same_as` would form a circle.
     """
-    object_id = obj[OBJECT_ID]
-    room = {member[OBJECT_ID]: member for member in room_of(obj)}
+    object_id = chosen_in(obj) if object_id is None else object_id
+    room = instances_in(room_of(obj))
     newer = parse(
         {"objects": {str(object_id): {key: _plain(value) for key, value in values.items()}}},
-        f"Object '{obj.name}'",
+        f"Object '{name_of(obj, object_id)}'",
         room,
     )
-    older = {i: Given(**_tuples(given(member))) for i, member in room.items() if i == object_id or GIVEN in member}
+    room[object_id] = obj
+    older = {
+        i: Given(**_tuples(given(member, i)))
+        for i, member in room.items()
+        if i == object_id or key_of(GIVEN, member, i) in member
+    }
     override = merge(Overrides(older), newer).of(object_id).as_dict()
-    material.note(obj)
-    obj[GIVEN] = json.dumps(override)
-    show(obj)
+    material.note(obj, object_id)
+    obj[key_of(GIVEN, obj, object_id)] = json.dumps(override)
+    show(obj, object_id)
     for other in room_of(obj):
-        if other != obj and GIVEN in other and given(other).get("same_as") == object_id:
-            show(other)
+        for i in slots_of(other):
+            if (other, i) != (obj, object_id) and key_of(GIVEN, other, i) in other:
+                if given(other, i).get("same_as") == object_id:
+                    show(other, i)
 
 
 def take_back(obj: bpy.types.Object, *keys: str) -> None:
     """Go back to what was found, for `keys` or in everything."""
     give(obj, **dict.fromkeys(keys or tuple(given(obj)), None))
+
+
+def instances_in(objects: Iterable[bpy.types.Object]) -> dict[int, bpy.types.Object]:
+    """The object that shows each instance."""
+    return {object_id: obj for obj in objects for object_id in slots_of(obj)}
 
 
 def _plain(value):
@@ -116,20 +133,32 @@ def _tuples(override: dict[str, Any]) -> dict[str, Any]:
     return {key: tuple(value) if isinstance(value, list) else value for key, value in override.items()}
 
 
+def carry(before: dict[int, bpy.types.Object], after: dict[int, bpy.types.Object]) -> None:
+    """Move what is given of instances to the objects that show them now, both as `instances_in` gives them."""
+    for object_id in before.keys() & after.keys():
+        old, new = before[object_id], after[object_id]
+        for name in (GIVEN, FOUND, WHITE) if old != new else ():
+            if (value := old.pop(key_of(name, old, object_id), None)) is not None:
+                new[key_of(name, new, object_id)] = value
+
+
 def by_id(obj: bpy.types.Object, object_id: int) -> bpy.types.Object | None:
-    """Another object of the same room."""
-    return next((other for other in room_of(obj) if other[OBJECT_ID] == object_id and correctable(other)), None)
+    """The object of the same room that shows another instance."""
+    members = (other for other in room_of(obj) if object_id in slots_of(other))
+    return next((other for other in members if correctable(other, object_id)), None)
 
 
-def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[str, Any]:
+def effective(obj: bpy.types.Object, object_id: int | None = None, visited: frozenset = frozenset()) -> dict[str, Any]:
     """The values recovered of an object (`material.recovered_values`), overridden by those given."""
-    override = given(obj)
-    source = by_id(obj, override["same_as"]) if override.get("same_as") is not None else None
+    object_id = chosen_in(obj) if object_id is None else object_id
+    override = given(obj, object_id)
+    like = override.get("same_as")
+    source = by_id(obj, like) if like is not None else None
     copied = {}
-    if source is not None and source.name not in visited:
-        copied = effective(source, visited | {obj.name})
+    if source is not None and like not in visited:
+        copied = effective(source, like, visited | {object_id})
         copied = {key: copied[key] for key in LOBE}
-    values = _base_values(obj, override, (override | copied).get("model"))
+    values = _base_values(obj, object_id, override, (override | copied).get("model"))
     previous_model = values["model"]
     values |= copied
     values |= {key: override[key] for key in (*LOBE, "base_color") if key in override}
@@ -150,22 +179,24 @@ def effective(obj: bpy.types.Object, visited: frozenset = frozenset()) -> dict[s
     return values
 
 
-def _base_values(obj: bpy.types.Object, override: dict, model: str | None) -> dict[str, Any]:
+def _base_values(obj: bpy.types.Object, object_id: int, override: dict, model: str | None) -> dict[str, Any]:
     """The values that an override replaces: fitted by the run to that model, else found before one was given."""
-    original, worn = material.recovered_values(obj), material.worn(obj)
+    original, worn = material.recovered_values(obj, object_id), material.worn(obj, object_id)
     if worn["model"] != (model or original["model"]):
         return original
-    withdrawn = (entry(obj).get("given") or {}).keys() - override.keys()  # given to the run, and not any more
+    # What was given to the run, and is not any more.
+    withdrawn = (entry(obj, object_id).get("given") or {}).keys() - override.keys()
     return worn | {key: original[key] for key in worn if key in withdrawn or ("same_as" in withdrawn and key in LOBE)}
 
 
-def show(obj: bpy.types.Object) -> None:
+def show(obj: bpy.types.Object, object_id: int | None = None) -> None:
     """Update an object's material to what is given."""
-    if correctable(obj):
-        with our_own(material.worn_material(obj)):
-            material.show(obj, effective(obj))
-        if not given(obj) and material.recovered_values(obj) == material.worn(obj):
-            obj.pop(FOUND, None)
+    object_id = chosen_in(obj) if object_id is None else object_id
+    if correctable(obj, object_id):
+        with our_own(material.worn_material(obj, object_id)):
+            material.show(obj, object_id, effective(obj, object_id))
+        if not given(obj, object_id) and material.recovered_values(obj, object_id) == material.worn(obj, object_id):
+            obj.pop(key_of(FOUND, obj, object_id), None)
 
 
 def reapply(obj: bpy.types.Object) -> list[str]:
@@ -175,60 +206,43 @@ def reapply(obj: bpy.types.Object) -> list[str]:
     warnings on what no longer fits.
     """
     if obj.type == "MESH" and SMOOTH in obj and not obj.data.library:
-        _shade(obj.data, obj[SMOOTH])
-    if not correctable(obj) or is_corrected(material.worn_material(obj)):
-        return []
-    material.renew(obj, given(obj))
-    messages = unseen.reapply(obj)
-    show(obj)
+        shade(obj.data, obj[SMOOTH])
+    made = [
+        object_id
+        for object_id in slots_of(obj)
+        if correctable(obj, object_id) and not is_corrected(material.worn_material(obj, object_id))
+    ]
+    for object_id in made:
+        material.renew(obj, object_id, given(obj, object_id))
+    messages = unseen.reapply(obj) if made else []
+    for object_id in made:
+        show(obj, object_id)
     return messages
-
-
-def smooth(objects: Iterable[bpy.types.Object], angle: float) -> int:
-    """Shade objects smooth but for edges sharper than `angle` radians; 0 makes them flat again.
-
-    The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
-    found. Returns how many meshes were changed.
-    """
-    changed = set()
-    for obj in objects:
-        if angle > 0:
-            obj[SMOOTH] = float(angle)
-        elif SMOOTH in obj:
-            del obj[SMOOTH]
-        if obj.data not in changed:
-            _shade(obj.data, angle)
-            changed.add(obj.data)
-    return len(changed)
-
-
-def _shade(data: bpy.types.Mesh, angle: float) -> None:
-    if angle > 0:
-        data.shade_smooth()
-        data.set_sharp_from_angle(angle=angle)
-    else:
-        if "sharp_edge" in data.attributes:
-            data.attributes.remove(data.attributes["sharp_edge"])
-        data.shade_flat()
-    data.update()
 
 
 def say_white(obj: bpy.types.Object, albedo) -> None:
     """Give an object's albedo (one number or three, 0...1), in place of any other given in its room."""
     value = _plain(albedo if hasattr(albedo, "__len__") else [float(albedo)] * 3)
     take_white_back(obj)
-    obj[WHITE] = value
+    obj[key_of(WHITE, obj)] = value
 
 
-def white_of(obj: bpy.types.Object) -> tuple[bpy.types.Object, list[float]] | None:
-    """The object of a room whose albedo is given, and that albedo; None where none is."""
-    return next(((member, list(member[WHITE])) for member in room_of(obj) if WHITE in member), None)
+def white_of(obj: bpy.types.Object) -> tuple[bpy.types.Object, int, list[float]] | None:
+    """The object of a room whose albedo is given, which instance of it, and that albedo; None where none is."""
+    return next(_whites(room_of(obj)), None)
+
+
+def _whites(objects: Iterable[bpy.types.Object]) -> Iterator[tuple[bpy.types.Object, int, list[float]]]:
+    for obj in objects:
+        for object_id in slots_of(obj):
+            if (key := key_of(WHITE, obj, object_id)) in obj:
+                yield obj, object_id, list(obj[key])
 
 
 def take_white_back(obj: bpy.types.Object) -> None:
     """Have the room's scale follow from the frames alone again."""
-    for other in room_of(obj):
-        other.pop(WHITE, None)
+    for other, object_id, _ in list(_whites(room_of(obj))):
+        del other[key_of(WHITE, other, object_id)]
 
 
 def folder_for(objects: Iterable[bpy.types.Object]) -> Path:
@@ -257,7 +271,7 @@ def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
         for obj in look.recovered(scene)
         if result_folder(obj) == folder or obj.get(CAPTURE) == str(capture) or obj in room
     ]
-    if any(GIVEN in obj or WHITE in obj for obj in objects) or _written.get(folder):
+    if any(key.startswith((GIVEN, WHITE)) for obj in objects for key in obj.keys()) or _written.get(folder):
         if not folder.exists():
             folder.mkdir(parents=True)
             write_capture(folder, capture)  # from the first file on it is that capture's
@@ -284,19 +298,21 @@ def keep(scene: bpy.types.Scene, folder: Path, objects: Iterable[bpy.types.Objec
     """
     if objects is None:
         objects = [obj for obj in look.recovered(scene) if result_folder(obj) == folder]
-    scene_entries = {obj[OBJECT_ID]: Given(**_tuples(given(obj))) for obj in objects if GIVEN in obj}
+    scene_entries = {
+        i: Given(**_tuples(given(obj, i))) for obj in objects for i in slots_of(obj) if key_of(GIVEN, obj, i) in obj
+    }
     result = made_by(folder)
-    stored = kept_overrides(folder, {*result, *(obj[OBJECT_ID] for obj in objects)})
+    stored = kept_overrides(folder, {*result, *instances_in(objects)})
     written = _written.setdefault(folder, set())
     entries = {i: override for i, override in stored.objects.items() if i not in written} | scene_entries
     white = stored.white if "white" not in written else None
-    white_object = next((obj for obj in objects if WHITE in obj), None)
-    if white_object is not None:
-        white = White(white_object[OBJECT_ID], tuple(white_object[WHITE]))
+    white_here = next(_whites(objects), None)
+    if white_here is not None:
+        white = White(white_here[1], tuple(white_here[2]))
     updated = Overrides({i: override for i, override in entries.items() if override.any}, white)
     if updated.as_dict() != stored.as_dict():
         write_bytes(folder / OVERRIDES, json.dumps(updated.as_dict(), indent=1).encode())
-    written |= scene_entries.keys() | ({"white"} if white_object is not None else set())
+    written |= scene_entries.keys() | ({"white"} if white_here is not None else set())
     return {i for i, override in result.items() if updated.of(i).as_dict() != (override.get("given") or {})}
 
 

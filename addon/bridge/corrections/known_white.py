@@ -9,6 +9,7 @@ from mathutils.interpolate import poly_3d_calc
 
 from ...core.errors import BadInputError
 from ...core.pipeline.params import CORRECTED
+from ..data.instances import chosen_in, name_of
 from ..data.mesh_objects import ATLAS_UV
 from ..scene.write import ALBEDO
 from . import corrections, unseen
@@ -17,7 +18,7 @@ from . import corrections, unseen
 def of_object(
     obj: bpy.types.Object, location: Vector, albedo: tuple[float, float, float], depsgraph: bpy.types.Depsgraph
 ) -> list[float]:
-    """The mean albedo of an object from the known albedo of one spot.
+    """The mean albedo of an object, or of the part of it whose material slot is active, from that of one spot.
 
     Parameters
     ----------
@@ -36,10 +37,10 @@ def of_object(
     """
     mean = (corrections.entry(obj).get("evidence") or {}).get("albedo")
     if mean is None:
-        raise BadInputError(f"The mean albedo of '{obj.name}' is not known; click on an object that was measured.")
+        raise BadInputError(f"The mean albedo of '{name_of(obj)}' is not known; click on an object that was measured.")
     local_albedo = _albedo_around(obj, _uv(obj, location, depsgraph))
     if min(local_albedo) < 1e-3:
-        raise BadInputError(f"That spot on '{obj.name}' is black in the result; click on a brighter one.")
+        raise BadInputError(f"That spot on '{name_of(obj)}' is black in the result; click on a brighter one.")
     required = [known * whole / spot for known, whole, spot in zip(albedo, mean, local_albedo, strict=True)]
     if max(required) > 1:
         raise BadInputError(
@@ -51,7 +52,7 @@ def of_object(
 
 def _albedo_around(obj, uv) -> list[float]:
     """Median of the measured albedo around a place of the atlas."""
-    node = unseen.texture_node(obj)
+    node = unseen.texture_node(obj, chosen_in(obj))
     if node is None:
         raise BadInputError(f"Object '{obj.name}' has one colour and no albedo of its spots; click on another.")
     quality = unseen.coverage(obj)[..., 2]

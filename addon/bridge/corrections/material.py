@@ -1,7 +1,8 @@
-"""The material of a corrected object: what is given laid over what was found, and back.
+"""The material of a corrected object, or a part of one: what is given laid over what was found, and back.
 
-Before the first change the object stores what was found (`custom_properties.FOUND`), and the material what it showed:
-to go back needs neither the result folder nor this add-on's memory.
+All take an object and the instance of the capture that it is about, by default that of its active material slot. Before
+the first change the object stores what was found (`custom_properties.FOUND`), and the material what it showed: to go
+back needs neither the result folder nor this add-on's memory.
 """
 
 import json
@@ -14,6 +15,7 @@ from ...core.brdf.lambertian import LAMBERTIAN
 from ...core.brdf.registry import find_or_lambertian
 from ...core.results.overrides import LOBE
 from ..custom_properties import FOUND
+from ..data.instances import chosen_in, key_of, materials_of
 from ..data.materials import (
     BASE_COLOR,
     EMISSION_STRENGTH,
@@ -36,52 +38,50 @@ TINT = "Scan Relight tint"
 _NUMBERS = (METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_STRENGTH)
 
 
-def worn_material(obj: bpy.types.Object) -> bpy.types.Material | None:
-    """The recovered material that an object wears; None where it wears none that can be changed."""
-    return next(
-        (
-            slot.material
-            for slot in obj.material_slots
-            if slot.material and MODEL in slot.material and not slot.material.library and principled(slot.material)
-        ),
-        None,
-    )
+def worn_material(obj: bpy.types.Object, object_id: int | None = None) -> bpy.types.Material | None:
+    """The recovered material that an instance wears; None where it wears none that can be changed."""
+    materials = materials_of(obj, object_id)
+    return next((m for m in materials if MODEL in m and not m.library and principled(m)), None)
 
 
-def entry(obj: bpy.types.Object) -> dict[str, Any]:
-    """What an object's own run says of it; {} where that is gone or another run took its place."""
-    return file.rows([obj]).get(obj, {})
+def entry(obj: bpy.types.Object, object_id: int | None = None) -> dict[str, Any]:
+    """What an object's own run says of an instance; {} where that is gone or another run took its place."""
+    return file.rows_of_parts([obj]).get(obj, {}).get(chosen_in(obj) if object_id is None else object_id, {})
 
 
-def recovered_values(obj: bpy.types.Object) -> dict[str, Any]:
+def recovered_values(obj: bpy.types.Object, object_id: int | None = None) -> dict[str, Any]:
     """`model`, `roughness`, `f0` and `base_color` as they were recovered; None where the model has none."""
-    return worn(obj) | json.loads(obj.get(FOUND, "{}"))
+    return worn(obj, object_id) | json.loads(obj.get(key_of(FOUND, obj, object_id), "{}"))
 
 
-def worn(obj: bpy.types.Object) -> dict[str, Any]:
+def worn(obj: bpy.types.Object, object_id: int | None = None) -> dict[str, Any]:
     """The same values as the run wrote them into its material, with what was given to that run."""
-    material = worn_material(obj)
-    return json.loads(material[WORN])["values"] if WORN in material else _shown_values(material, entry(obj))
+    material = worn_material(obj, object_id)
+    if WORN in material:
+        return json.loads(material[WORN])["values"]
+    return _shown_values(material, entry(obj, object_id))
 
 
-def note(obj: bpy.types.Object) -> None:
+def note(obj: bpy.types.Object, object_id: int | None = None) -> None:
     """Note what was found, before the first thing is given."""
-    if FOUND not in obj and not entry(obj).get("given"):
-        obj[FOUND] = json.dumps(worn(obj))
+    found = key_of(FOUND, obj, object_id)
+    if found not in obj and not entry(obj, object_id).get("given"):
+        obj[found] = json.dumps(worn(obj, object_id))
 
 
-def renew(obj: bpy.types.Object, given: dict[str, Any]) -> None:
+def renew(obj: bpy.types.Object, object_id: int, given: dict[str, Any]) -> None:
     """A run has made the material anew: keep of the values found before only those that are overridden."""
-    worn_material(obj).pop(WORN, None)
+    worn_material(obj, object_id).pop(WORN, None)
     keys = given.keys() | (set(LOBE) if {"model", "same_as"} & given.keys() else set())
-    remaining = {key: value for key, value in json.loads(obj.get(FOUND, "{}")).items() if key in keys}
+    found = key_of(FOUND, obj, object_id)
+    remaining = {key: value for key, value in json.loads(obj.get(found, "{}")).items() if key in keys}
     if remaining:
-        obj[FOUND] = json.dumps(remaining)
+        obj[found] = json.dumps(remaining)
     else:
-        obj.pop(FOUND, None)
+        obj.pop(found, None)
 
 
-def show(obj: bpy.types.Object, values: dict[str, Any]) -> None:
+def show(obj: bpy.types.Object, object_id: int, values: dict[str, Any]) -> None:
     """Bring a material in line.
 
     Parameters
@@ -89,7 +89,7 @@ def show(obj: bpy.types.Object, values: dict[str, Any]) -> None:
     values : dict
         `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
     """
-    material, original = worn_material(obj), worn(obj)
+    material, original = worn_material(obj, object_id), worn(obj, object_id)
     if WORN not in material:
         if values == original:
             return

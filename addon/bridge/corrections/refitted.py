@@ -8,8 +8,9 @@ import bpy
 
 from ...core.errors import MissingStageError
 from ...core.results.room_file import material
-from ..custom_properties import IMAGE, OBJECT_ID, RESULT, UV_MAP, set_run
+from ..custom_properties import IMAGE, RESULT, UV_MAP, set_run
 from ..data.images import tiles_of
+from ..data.instances import chosen_in, name_of, slots_of
 from ..data.materials import dress
 from ..data.mesh_objects import is_open
 from ..light import lamps
@@ -31,7 +32,7 @@ def words(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[
     Parameters
     ----------
     objects : iterable of bpy.types.Object
-        At least these are fitted again; they are of one room.
+        At least these are fitted again, each by what its active material slot shows; they are of one room.
 
     Returns
     -------
@@ -51,7 +52,7 @@ def words(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[
     """
     objects = list(objects)
     folder = corrections.folder_for(objects)
-    object_ids = corrections.keep(scene, folder) | {obj[OBJECT_ID] for obj in objects}
+    object_ids = corrections.keep(scene, folder) | {chosen_in(obj) for obj in objects}
     options = [word for object_id in sorted(object_ids) for word in ("--object", str(object_id))]
     return folder, ["refit", str(folder), *options], corrections.made_by(folder)
 
@@ -78,23 +79,26 @@ def bringing(
     after : result_file.Result
         What `words` and `fitted` gave.
     """
-    objects = [
-        obj for obj in scene.objects if corrections.correctable(obj) and corrections.result_folder(obj) == folder
-    ]
+    objects = [obj for obj in scene.objects if _wears_some(obj) and corrections.result_folder(obj) == folder]
     image = _renew_images(folder)
     run, warnings, edited = after.run, [], []
     for done, obj in enumerate(objects):
         yield done / max(len(objects), 1)
-        object_id = obj[OBJECT_ID]
-        entry = after.objects.get(object_id)
         set_run(obj, folder, run)
-        if entry is not None and any(entry.get(key) != before.get(object_id, {}).get(key) for key in _MATERIAL_KEYS):
-            if is_corrected(worn_material(obj)):
-                edited.append(obj.name)
+        changed = False
+        for object_id in slots_of(obj):
+            entry, worn = after.objects.get(object_id), worn_material(obj, object_id)
+            earlier = before.get(object_id, {})
+            if entry is None or worn is None or all(entry.get(key) == earlier.get(key) for key in _MATERIAL_KEYS):
                 continue
-            node_images = (getattr(node, "image", None) for node in worn_material(obj).node_tree.nodes)
-            _dress(obj, entry, next((texture for texture in node_images if texture and UV_MAP in texture), image))
-            warnings += corrections.reapply(obj)
+            if is_corrected(worn):
+                edited.append(name_of(obj, object_id))
+                continue
+            node_images = (getattr(node, "image", None) for node in worn.node_tree.nodes)
+            texture = next((texture for texture in node_images if texture and UV_MAP in texture), image)
+            _dress(obj, object_id, entry, texture)
+            changed = True
+        warnings += corrections.reapply(obj) if changed else []
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             set_run(collection, folder, run)
@@ -102,10 +106,14 @@ def bringing(
     return (*warnings, *sentences((edited, "the material was edited by hand and stays")))
 
 
-def _dress(obj: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:
-    """Make an object's material anew in place; a lamp stays as bright as it was set."""
-    worn = worn_material(obj)
-    description, node = material(entry), unseen.texture_node(obj)
+def _wears_some(obj: bpy.types.Object) -> bool:
+    return any(corrections.correctable(obj, object_id) for object_id in slots_of(obj))
+
+
+def _dress(obj: bpy.types.Object, object_id: int, entry: dict, image: bpy.types.Image | None) -> None:
+    """Make an instance's material anew in place; a lamp stays as bright as it was set."""
+    worn = worn_material(obj, object_id)
+    description, node = material(entry), unseen.texture_node(obj, object_id)
     if node is not None:
         image = unseen.source_of(node.image)
     state = lamps.snapshot(worn) if lamps.is_lamp(worn) else None

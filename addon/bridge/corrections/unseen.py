@@ -5,7 +5,7 @@ no run writes over it. One image serves all objects that share an atlas; each ob
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import bpy
@@ -19,6 +19,7 @@ from ...core.significance import LEVELS
 from ..custom_properties import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
 from ..data.arrays import layer_of, triangles_of, vertices_of
 from ..data.images import DATA, array_image, image_array, load_image
+from ..data.instances import chosen_in, slots_of
 from ..data.materials import BASE_COLOR, principled
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import image_node
@@ -34,10 +35,21 @@ _SOURCE = "scan_relight_painted_over"
 MASK = "unseen"
 
 
-def texture_node(obj: bpy.types.Object) -> bpy.types.ShaderNode | None:
-    """The node whose image an object's Base Color shows; None where it shows one colour."""
-    shader = principled(worn_material(obj))
-    return image_node(shader.inputs[BASE_COLOR]) if shader else None
+def texture_node(obj: bpy.types.Object, object_id: int | None = None) -> bpy.types.ShaderNode | None:
+    """The node whose image the Base Color of an instance shows; None where it shows one colour.
+
+    By default that of the object's active material slot, or else of another of its parts.
+    """
+    return next(_texture_nodes(obj, slots_of(obj) if object_id is None else [object_id]), None)
+
+
+def _texture_nodes(obj: bpy.types.Object, instances: Iterable[int]) -> Iterator[bpy.types.ShaderNode]:
+    """The texture nodes of instances of an object, that of its active material slot first."""
+    for object_id in sorted(instances, key=lambda i: i != chosen_in(obj)):
+        shader = principled(worn_material(obj, object_id))
+        node = image_node(shader.inputs[BASE_COLOR]) if shader else None
+        if node is not None:
+            yield node
 
 
 def painted(obj: bpy.types.Object) -> bpy.types.Image | None:
@@ -80,7 +92,7 @@ def own_image(obj: bpy.types.Object, where: str = images.PACK) -> bpy.types.Imag
     elif image.get(RUN, "") != obj.get(RUN, ""):
         _renew(image, source, obj)  # what another run found of this object, which nobody painted
     image[_SOURCE] = source
-    _show(obj, node, image)
+    _show(obj, source, image)
     obj[PAINTED], obj[_UV] = image, _digest(obj.data)
     return image
 
@@ -94,13 +106,13 @@ def restore(objects: Iterable[bpy.types.Object], discard: bool = False) -> int:
     """Show what was found again; returns how many objects did not. `discard` also removes the paint from the image."""
     count = 0
     for obj in objects:
-        image, node = painted(obj), texture_node(obj)
+        image = painted(obj)
         if image is None:
             continue
         if discard and image.get(_SOURCE):
             _renew(image, image[_SOURCE], obj)
-        if node is not None and node.image == image:
-            _show(obj, node, image.get(_SOURCE) or load_image(image[PAINTED]))
+        if any(node.image == image for node in _texture_nodes(obj, slots_of(obj))):
+            _show(obj, image, image.get(_SOURCE) or load_image(image[PAINTED]))
         for key in (PAINTED, _UV):
             del obj[key]
         count += 1
@@ -109,22 +121,30 @@ def restore(objects: Iterable[bpy.types.Object], discard: bool = False) -> int:
 
 def reapply(obj: bpy.types.Object) -> list[str]:
     """Show what was painted again on an object whose mesh or material is new; warnings on what no longer fits."""
-    image, node = painted(obj), texture_node(obj)
-    if image is None or node is None or node.image == image:
+    image = painted(obj)
+    if image is None:
+        return []
+    found = (node.image for node in _texture_nodes(obj, slots_of(obj)) if node.image != image)
+    source = next((other for other in found if Path(path_of(other)).name == Path(image[PAINTED]).name), None)
+    if source is None:
         return []
     if obj.get(_UV) != _digest(obj.data):
         return [
             f"What was painted on '{obj.name}' lies on other texture coordinates than this run's; it is kept as "
             f"image '{image.name}' and not shown."
         ]
-    image[_SOURCE] = node.image
-    _show(obj, node, image)
+    image[_SOURCE] = source
+    _show(obj, source, image)
     return []
 
 
-def _show(obj, node, image) -> None:
-    with our_own(worn_material(obj)):
-        node.image = image
+def _show(obj, earlier, image) -> None:
+    """Have all parts of an object that show the image `earlier` show another one."""
+    for object_id in slots_of(obj):
+        node = texture_node(obj, object_id)
+        if node is not None and node.image == earlier:
+            with our_own(worn_material(obj, object_id)):
+                node.image = image
 
 
 def keep_painted() -> None:

@@ -23,12 +23,18 @@ VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
 class Hit(NamedTuple):
-    """Where a ray ends: location and unit normal towards the ray's origin (metres), distance, object."""
+    """Where a ray ends: location and unit normal towards the ray's origin (metres), distance, object, material slot."""
 
     location: Vector
     normal: Vector
     distance: float
     obj: bpy.types.Object
+    slot: int = 0
+
+    @property
+    def material(self) -> bpy.types.Material | None:
+        """The material that is hit."""
+        return self.obj.material_slots[self.slot].material if self.obj.material_slots else None
 
 
 def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -50,10 +56,14 @@ def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
 def cast(scene: bpy.types.Scene, origin: Vector, direction: Vector, distance: float = 1e4) -> Hit | None:
     """The first surface along a ray."""
     direction = direction.normalized()
-    hit, location, normal, _, obj, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
+    depsgraph = depsgraph_of(scene)
+    hit, location, normal, face, obj, _ = scene.ray_cast(depsgraph, origin, direction, distance=distance)
     if not hit:
         return None
-    return Hit(location, -normal if normal.dot(direction) > 0 else normal, (location - origin).length, obj)
+    slot, count = 0, len(obj.material_slots)
+    if count > 1 and obj.type == "MESH":
+        slot = min(obj.evaluated_get(depsgraph).data.polygons[face].material_index, count - 1)
+    return Hit(location, -normal if normal.dot(direction) > 0 else normal, (location - origin).length, obj, slot)
 
 
 def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
@@ -62,7 +72,7 @@ def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
         hit = cast(scene, origin, direction)
         if hit is None:
             return True
-        if not any(opacity(slot.material) < 0.5 for slot in hit.obj.material_slots if slot.material):
+        if hit.material is None or opacity(hit.material) >= 0.5:
             return False
         origin = hit.location + direction.normalized() * 1e-4
     return False

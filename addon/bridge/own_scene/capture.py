@@ -25,25 +25,31 @@ from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
 from ..refused import MAX_LISTED, sentences, whole_folder
 from . import cameras as scene_cameras
-from .mesh import Part, SceneMesh, gather, joined
+from .mesh import SceneMesh, SceneObject, gather, joined
 
 OBJECTS, FACES = "scene.json", "faces.npz"
 
 
 @dataclass(frozen=True)
 class Source:
-    """The object of the scene that an instance of the capture was made of.
+    """The object of the scene, or the part of it, that an instance of the capture was made of.
 
     Attributes
     ----------
+    name : str
+        As displayed to the artist.
     thing : str
         Name of the object that shows it, at the time of capture.
+    whole : str
+        Displayed name of the whole object.
     own : bool
         Its faces are those of the object's mesh.
     topology : str
-        See `own_scene.mesh.Part.topology`.
+        See `own_scene.mesh.SceneObject.topology`; of the whole object.
     corner_start : int
-        First of its corners in `faces.npz`.
+        First of the object's corners in `faces.npz`.
+    slot, face_set, part_of : int or None
+        See `own_scene.segments.Segment`.
     """
 
     object_id: int
@@ -52,6 +58,10 @@ class Source:
     own: bool
     topology: str
     corner_start: int
+    slot: int | None = None
+    face_set: int | None = None
+    part_of: int | None = None
+    whole: str = ""
 
 
 def capture_scene(
@@ -96,10 +106,10 @@ def capture_scene(
             "No camera has a picture behind it; give each camera its frame as a background image, or "
             "one animated camera a sequence (Camera, Background Images)."
         )
-    parts = gather(context.evaluated_depsgraph_get(), objects)
-    if not parts:
+    scene_objects = gather(context.evaluated_depsgraph_get(), objects)
+    if not scene_objects:
         raise BadInputError("No object with faces is selected; select the room's objects first.")
-    mesh = joined(parts)
+    mesh = joined(scene_objects)
     # Only the triangles that the reader will keep, so that its triangles are the file's, one by one.
     raw = RawMesh(mesh.vertices, mesh.triangles, np.arange(len(mesh.triangles)), name="of the scene")
     indices = repair(raw)[0].object_id
@@ -120,16 +130,16 @@ def capture_scene(
         raise BadInputError(f"None of the pictures can be used: {message}")
     metre = scene.unit_settings.scale_length if scene.unit_settings.system != "NONE" else 1.0
     with whole_folder(folder, f"The scene can't be captured into '{folder}'") as part:
-        _write(part, mesh, parts, views, metre)
+        _write(part, mesh, scene_objects, views, metre)
     return (
         (f"{len(problems)} of {len(problems) + len(views)} pictures are left out: {message}",) if problems else ()
-    ) + _write_back_warnings(parts)
+    ) + _write_back_warnings(scene_objects)
 
 
-def _write_back_warnings(parts: list[Part]) -> tuple[str, ...]:
+def _write_back_warnings(scene_objects: list[SceneObject]) -> tuple[str, ...]:
     """Warnings about objects that materials can't be written back to directly."""
-    generated = [part.name for part in parts if not part.own]
-    linked = [part.name for part in parts if part.own and (part.obj.library or part.obj.override_library)]
+    generated = [entry.name for entry in scene_objects if not entry.own]
+    linked = [entry.name for entry in scene_objects if entry.own and (entry.obj.library or entry.obj.override_library)]
     local = "make it local first (Object, Relations, Make Local)"
     return sentences(
         (generated, "modifiers or instances make the faces, so the materials can only go onto a copy"),
@@ -138,10 +148,28 @@ def _write_back_warnings(parts: list[Part]) -> tuple[str, ...]:
 
 
 def _write(
-    folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_cameras.View], unit_scale: float
+    folder: Path, mesh: SceneMesh, scene_objects: list[SceneObject], views: list[scene_cameras.View], unit_scale: float
 ) -> None:
     (folder / "mesh.ply").write_bytes(ply_bytes(mesh.vertices * unit_scale, [(mesh.triangles, mesh.object_id)]))
-    names = [{"id": part.object_id, "class_name": part.class_name, "name": part.name} for part in parts]
+    names, entries = [], []
+    for scene_object in scene_objects:
+        for segment in scene_object.segments:
+            part_of = {} if segment.part_of is None else {"part_of": segment.part_of}
+            names.append({"id": segment.object_id, "class_name": segment.class_name, "name": segment.name} | part_of)
+            entries.append(
+                Source(
+                    segment.object_id,
+                    segment.name,
+                    scene_object.obj.name,
+                    scene_object.own,
+                    scene_object.topology,
+                    mesh.corner_start[segment.object_id],
+                    segment.slot,
+                    segment.face_set,
+                    segment.part_of,
+                    scene_object.name,
+                )
+            )
     _write_json(folder / "info_semantic.json", {"objects": names})
     (folder / "images").mkdir()
     frames = []
@@ -155,10 +183,6 @@ def _write(
             frame[OWN_LENS] = lens_to_json(camera.lens)
         frames.append(frame | view.properties)
     _write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
-    entries = [
-        Source(part.object_id, part.name, part.obj.name, part.own, part.topology, mesh.corner_start[part.object_id])
-        for part in parts
-    ]
     with (folder / FACES).open("wb") as file:
         np.savez(file, **mesh.polygons._asdict())
     _write_json(folder / OBJECTS, {"objects": [asdict(source) for source in entries]})
@@ -182,7 +206,8 @@ def sources(folder: Path | str) -> tuple[Source, ...]:
     if not path.is_file():
         return ()
     try:
-        return tuple(Source(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))["objects"])
+        entries = json.loads(path.read_text(encoding="utf-8"))["objects"]
+        return tuple(Source(**{"whole": entry["name"]} | entry) for entry in entries)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"'{path}' is damaged; capture the scene again.") from error
 

@@ -1,7 +1,7 @@
 """Objects of the open scene as one mesh of triangles, with the face that each triangle was cut from.
 
-Read as the viewport shows it: modifiers and instances evaluated, in world space. Each object has its own materials, so
-each becomes an instance of the capture; so does each object that an instanced collection shows.
+Read as the viewport shows it: modifiers and instances evaluated, in world space. An object, and each object that an
+instanced collection shows, becomes an instance of the capture for each of its segments (`segments.py`).
 """
 
 import hashlib
@@ -14,41 +14,41 @@ import numpy as np
 from ...core.errors import BadInputError
 from ..data.arrays import faces_of, make_mesh, triangles_of, vertices_of
 from ..data.unwrap import Polygons
+from .segments import Piece, Segment, read_piece, segments_of
 
 OBJECT_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
 """Types of objects that may have faces; an empty has those of the collection that it instances."""
 
 
 @dataclass
-class Part:
-    """One instance of the capture.
+class SceneObject:
+    """An object of the scene, or one that an instanced collection shows.
 
     Attributes
     ----------
     name : str
         As displayed to the artist.
-    class_name : str
-        Shared by objects with the same mesh, as they are of one kind.
     obj : bpy.types.Object
         The artist's object that shows it.
     own : bool
         Its faces are those of the object's mesh, one by one and in their order, so that materials can be put there.
-    pieces : list of (vertices, starts, corners, loops)
-        World positions (v, 3) float64; first corner of each face (f + 1,), vertex of each corner (c,) and the corners
-        of each triangle (t, 3), int32.
+    segments : list of Segment
+        Its instances, the main one first.
+    segment_of : list of (f,) int
+        Index in `segments` of each face, piece by piece.
     """
 
-    object_id: int
     name: str
-    class_name: str
     obj: bpy.types.Object
     own: bool = True
-    pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
+    segment_of: list[np.ndarray] = field(default_factory=list)
 
     @property
     def topology(self) -> str:
         """A hash of what its faces connect; stays the same where vertices are only moved."""
-        return topology_hash([piece[1:3] for piece in self.pieces])
+        return topology_hash([(piece.starts, piece.corners) for piece in self.pieces])
 
     def mesh(self) -> bpy.types.Mesh:
         """Its faces as a mesh of their own, in world coordinates, flat."""
@@ -58,7 +58,7 @@ class Part:
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """All parts as one.
+    """All objects as one.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class SceneMesh:
     polygons : Polygons
         The faces that the triangles were cut from, over the same vertices.
     corner_start : dict of int to int
-        First corner in `polygons` of each object; the next ones follow in the order of its mesh's loops.
+        First corner in `polygons` of each instance's object; the next ones follow in the order of its mesh's loops.
     """
 
     vertices: np.ndarray
@@ -79,7 +79,7 @@ class SceneMesh:
     corner_start: dict[int, int]
 
 
-def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) -> list[Part]:
+def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) -> list[SceneObject]:
     """Read the evaluated faces of objects.
 
     Parameters
@@ -91,7 +91,7 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
 
     Returns
     -------
-    list of Part
+    list of SceneObject
         In the order of `objects`; one without faces is left out. Same scene, same numbers.
 
     Raises
@@ -100,7 +100,7 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
         An object has vertices that are not finite.
     """
     ranks = {obj: rank for rank, obj in enumerate(objects) if obj.type in OBJECT_TYPES}
-    by_key: dict[tuple, Part] = {}
+    by_key: dict[tuple, SceneObject] = {}
     for instance in depsgraph.object_instances:
         original = instance.parent.original if instance.is_instance and instance.parent else instance.object.original
         if original not in ranks or instance.object.type != "MESH":
@@ -108,14 +108,14 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
         instanced = instance.is_instance and original.type == "EMPTY"
         # Instances that a mesh object generates itself (geometry nodes, particles) belong to it.
         key = (ranks[original], *(instance.persistent_id if instanced else ()))
-        part = by_key.get(key)
-        if part is None:
+        scene_object = by_key.get(key)
+        if scene_object is None:
             name = f"{original.name}/{instance.object.name}" if instanced else original.name
-            part = by_key[key] = Part(0, name, "", original)
+            scene_object = by_key[key] = SceneObject(name, original)
         data = instance.object.data
-        part.own &= (
+        scene_object.own &= (
             not instance.is_instance
-            and not part.pieces
+            and not scene_object.pieces
             and original.type == "MESH"
             and same_topology(data, original.data)
         )
@@ -124,13 +124,19 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
             raise BadInputError(f"Object '{original.name}' has vertices that are not finite; mend its mesh first.")
         if instance.matrix_world.is_negative:  # mirrored: the front is given by the reverse order of corners
             loops = loops[:, [0, 2, 1]]
-        part.pieces.append((vertices, *faces_of(data), loops))
-    parts = [by_key[key] for key in sorted(by_key) if any(len(loops) for *_, loops in by_key[key].pieces)]
+        scene_object.pieces.append(read_piece(instance.object, vertices, loops))
+    scene_objects = [by_key[key] for key in sorted(by_key) if any(len(piece.loops) for piece in by_key[key].pieces)]
     kinds: dict[bpy.types.ID, str] = {}
-    for number, part in enumerate(parts):
-        part.object_id = number
-        part.class_name = kinds.setdefault(part.obj.data, part.name) if part.own else part.name
-    return parts
+    first_id = 0
+    for scene_object in scene_objects:
+        class_name = (
+            kinds.setdefault(scene_object.obj.data, scene_object.name) if scene_object.own else scene_object.name
+        )
+        scene_object.segments, scene_object.segment_of = segments_of(
+            scene_object.pieces, scene_object.obj, scene_object.own, scene_object.name, class_name, first_id
+        )
+        first_id += len(scene_object.segments)
+    return scene_objects
 
 
 def same_topology(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
@@ -148,19 +154,21 @@ def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:
     return digest.hexdigest()
 
 
-def joined(parts: Iterable[Part]) -> SceneMesh:
-    """One mesh of all parts; triangles keep the order of the objects' faces."""
+def joined(scene_objects: Iterable[SceneObject]) -> SceneMesh:
+    """One mesh of all objects; triangles keep the order of the objects' faces."""
     columns = vertices, starts, corners, loops, ids = [], [], [], [], []
     first_vertex = first_corner = 0
     corner_start = {}
-    for part in parts:
-        corner_start[part.object_id] = first_corner
-        for points, start, corner, loop in part.pieces:
-            offset_arrays = points, start[:-1] + first_corner, corner + first_vertex, loop + first_corner
-            for column, values in zip(columns, (*offset_arrays, np.full(len(loop), part.object_id))):
+    for scene_object in scene_objects:
+        corner_start |= dict.fromkeys((segment.object_id for segment in scene_object.segments), first_corner)
+        object_ids = np.int32([segment.object_id for segment in scene_object.segments])
+        for piece, segment_of in zip(scene_object.pieces, scene_object.segment_of):
+            offset_arrays = piece.starts[:-1] + first_corner, piece.corners + first_vertex, piece.loops + first_corner
+            triangle_ids = object_ids[segment_of[piece.face_of_triangle]]
+            for column, values in zip(columns, (piece.vertices, *offset_arrays, triangle_ids)):
                 column.append(values)
-            first_vertex += len(points)
-            first_corner += len(corner)
+            first_vertex += len(piece.vertices)
+            first_corner += len(piece.corners)
     start, corner, loop, ids = (np.concatenate(arrays).astype(np.int32) for arrays in (starts, corners, loops, ids))
     polygons = Polygons(np.append(start, np.int32(first_corner)), corner, loop)
     return SceneMesh(np.concatenate(vertices), corner[loop], ids, polygons, corner_start)

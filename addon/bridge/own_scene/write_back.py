@@ -1,12 +1,15 @@
-"""Recovered materials onto the artist's own objects, and the original ones restored.
+"""Recovered materials onto the artist's own objects; `restore.py` brings the original ones back.
 
-Every slot of an object gets the recovered material, so its faces' material indices stay as they are. The original
-materials are stored on the object as pointers to the data-blocks, which survive renaming, saving and loading. A mesh
-that several objects share is copied for each, as each has its own part of the atlas; the shared one is stored likewise.
+Every slot of an object gets the recovered material, or each used slot its own, so its faces' material indices stay as
+they are. Only where face sets tell the parts, or a copy of evaluated faces is written, each part gets a slot, and its
+faces that index. The original materials are stored on the object as pointers to the data-blocks, which survive
+renaming, saving and loading. A mesh that several objects share is copied for each, as each has its own part of the
+atlas; the shared one is stored likewise.
 """
 
 from collections import Counter
 from collections.abc import Generator, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -16,23 +19,19 @@ from mathutils import Matrix
 from ...core.brdf.material import ObjectMaterial, undescribed
 from ...core.errors import BadInputError, MissingStageError
 from ...core.results.room_file import run_of
-from ...core.scene.model import Capture
-from ..custom_properties import OBJECT_ID, RESULT, RUN, set_run
-from ..data.arrays import faces_of, read, set_layer, vertices_of
-from ..data.materials import MODEL, make_material
-from ..data.mesh_objects import ATLAS_UV
+from ...core.scene.model import Capture, Instance
+from ..custom_properties import BEFORE, OBJECT_ID, set_run
+from ..data.arrays import faces_of, read, set_layer
+from ..data.materials import make_material
+from ..data.mesh_objects import ATLAS_UV, by_object
+from ..data.unwrap import Polygons
 from ..light.room import depsgraph_of
 from ..refused import sentences
 from ..results import images
 from .capture import Source, check_own, polygons_of, sources
-from .mesh import Part, gather, same_topology, topology_hash
+from .mesh import SceneObject, gather, topology_hash
+from .restore import COPY_OF, PREVIOUS_SLOT, PREVIOUS_UV, remove_copies, remove_unused_materials
 
-BEFORE = "scan_relight_before"
-"""Custom property of an object: its original materials, mesh or copies."""
-COPY_OF = "scan_relight_copy_of"
-"""Custom property of a copy: the object that it was made of."""
-PREVIOUS_UV = "ScanRelight before"
-"""New name of a UV map that already had the name of ours."""
 AUTO, IMPORTED, SELECTED = "AUTO", "IMPORTED", "SELECTED"
 """Objects that get the materials: those the capture was made of; the imported ones; the artist's own."""
 SUFFIX = " (Scan Relight)"
@@ -86,30 +85,37 @@ def writing_back(
     base_color = images.load_baked(result_folder, where)
     corner_uv, torn = corner_uvs(polygons, atlas_uv)
     descriptions = {material.object_id: material for material in materials}
+    slots = {source.object_id: source.slot for source in captured}
+    instances = by_object(capture.mesh, capture.instances)
     assignment = _Assignment(scene, Path(result_folder).absolute(), base_color)
     missing, edited, generated, linked, torn_names = [], [], [], [], []
     for done, source in enumerate(captured):
         yield done / len(captured)
+        if source.part_of is not None:  # written with its whole
+            continue
         obj = scene.objects.get(source.thing)
         if obj is None:
-            missing.append(source.name)
+            missing.append(source.whole)
             continue
         if obj.library or obj.override_library:
-            linked.append(source.name)
+            linked.append(source.whole)
             continue
-        description = descriptions.get(source.object_id) or undescribed(source.object_id, source.name)
+        parts = _parts(
+            source, instances.get(source.object_id, []), slots, capture.mesh.object_id, polygons, descriptions
+        )
         object_uv = corner_uv[source.corner_start :]
         if not source.own:
-            generated.append((source, obj, description, object_uv))
+            generated.append((source, obj, parts, object_uv))
         elif obj.type != "MESH" or topology_hash([faces_of(obj.data)]) != source.topology:
-            edited.append(source.name)
+            edited.append(source.whole)
         else:
-            assignment.assign(obj, source, description, object_uv[: len(obj.data.loops)])
+            assignment.back_up(obj, parts)
+            assignment.assign(obj, parts, object_uv[: len(obj.data.loops)])
             if torn[source.corner_start : source.corner_start + len(obj.data.loops)].any():
-                torn_names.append(source.name)
+                torn_names.append(source.whole)
     # Copies that are there already are renewed, or they would show an older result.
     to_copy = [item for item in generated if copies or "copies" in item[1].get(BEFORE, {})]
-    skipped = [item[0].name for item in generated if item not in to_copy]
+    skipped = [item[0].whole for item in generated if item not in to_copy]
     edited += assignment.copy(to_copy)
     return sentences(
         (missing, "deleted or renamed since the capture, so no material went there"),
@@ -130,6 +136,50 @@ def corner_uvs(polygons, atlas_uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return uv, torn
 
 
+@dataclass(frozen=True)
+class _Parts:
+    """What an object is to wear.
+
+    Attributes
+    ----------
+    materials : list of ObjectMaterial
+        The main part's first.
+    slots : list of int or None
+        Slot of each of these; None where each gets a slot by the faces' `part`.
+    part : (f,) int32
+        Index in `materials` of each face.
+    """
+
+    materials: list[ObjectMaterial]
+    slots: list[int] | None
+    part: np.ndarray
+
+    @property
+    def by_faces(self) -> bool:
+        """Whether writing changes the faces' material indices."""
+        return len(self.materials) > 1 and self.slots is None
+
+
+def _parts(
+    main: Source,
+    instances: list[Instance],
+    slot_of: dict,
+    object_id: np.ndarray,
+    polygons: Polygons,
+    descriptions: dict,
+) -> _Parts:
+    """The parts of the object whose main part is `main`: as captured, and those that the run itself has found."""
+    names = {main.object_id: main.name} | {instance.object_id: instance.name for instance in instances}
+    materials = [descriptions.get(i) or undescribed(i, name) for i, name in names.items()]
+    slots = [slot_of.get(i) for i in names]
+    # Faces without a triangle show nothing; they stay with the main part.
+    first = int(np.searchsorted(polygons.start, main.corner_start))
+    part = np.zeros(len(polygons.start) - 1 - first, np.int32)
+    for index, i in enumerate(names):
+        part[polygons.face[object_id == i] - first] = index
+    return _Parts(materials, slots if main.own and None not in slots else None, part)
+
+
 class _Assignment:
     """Assigns the recovered materials to one object after the other."""
 
@@ -138,11 +188,10 @@ class _Assignment:
         self.mesh_users = Counter(obj.data for obj in bpy.data.objects if obj.type == "MESH")
         self.run = run_of(folder)
 
-    def assign(self, obj: bpy.types.Object, source: Source, description: ObjectMaterial, uv: np.ndarray) -> None:
-        """Give an object atlas coordinates ((c, 2) float32) and the material; its original materials are stored."""
-        old_materials = [slot.material for slot in obj.material_slots]
+    def back_up(self, obj: bpy.types.Object, parts: _Parts) -> None:
+        """Store an object's original materials and slots, unless they are already, and give it a mesh of its own."""
         if BEFORE not in obj:
-            backup = {"slots": [{"material": material} if material else {} for material in old_materials]}
+            backup = {"slots": [{"material": slot.material} if slot.material else {} for slot in obj.material_slots]}
             if self.mesh_users[obj.data] > 1 or obj.data.library or obj.data.override_library:
                 backup["mesh"] = obj.data
                 obj.data = obj.data.copy()
@@ -150,34 +199,51 @@ class _Assignment:
                 backup["aside"] = True
                 obj.data.uv_layers[ATLAS_UV].name = PREVIOUS_UV
             obj[BEFORE] = backup
+        if parts.by_faces and "faces" not in obj[BEFORE]:
+            obj[BEFORE]["faces"] = True
+            if "material_index" in obj.data.attributes:
+                before = obj.data.attributes.new(PREVIOUS_SLOT, "INT", "FACE")
+                before.data.foreach_set("value", read(obj.data.polygons, "material_index", kind=np.int32))
+
+    def assign(self, obj: bpy.types.Object, parts: _Parts, uv: np.ndarray) -> None:
+        """Give an object atlas coordinates ((c, 2) float32) and its parts' materials."""
+        old_materials = [slot.material for slot in obj.material_slots]
         if set_layer(obj.data, ATLAS_UV, uv) is None:
             raise BadInputError(f"Object '{obj.name}' has no room for another UV map; take one away.")
-        material = make_material(description, self.base_color)
-        if not obj.material_slots:
-            obj.data.materials.append(material)
-        for slot in obj.material_slots:
-            slot.material = material
-        obj[OBJECT_ID] = source.object_id
+        materials = [make_material(description, self.base_color) for description in parts.materials]
+        for description, material in zip(parts.materials[1:], materials[1:]):
+            material[OBJECT_ID] = description.object_id
+        if len(materials) == 1:
+            slots = range(max(len(obj.material_slots), 1))
+            materials *= len(slots)
+        else:
+            slots = range(len(materials)) if parts.slots is None else parts.slots
+        while len(obj.material_slots) <= max(slots):
+            obj.data.materials.append(None)
+        for slot, material in zip(slots, materials, strict=True):
+            obj.material_slots[slot].material = material
+        if parts.by_faces:
+            obj.data.polygons.foreach_set("material_index", parts.part[: len(obj.data.polygons)])
+        obj[OBJECT_ID] = parts.materials[0].object_id
         set_run(obj, self.folder, self.run)
         remove_unused_materials(old_materials)
 
     def copy(self, generated: list[tuple]) -> list[str]:
         """Make the copies; returns the names of objects that have changed since the capture."""
-        owners = {obj for _, obj, _, _ in generated}
+        owners = {obj for _, obj, *_ in generated}
         for obj in owners:  # earlier copies are removed; the object itself is read
             remove_copies(obj)
         ordered = sorted(owners, key=lambda obj: obj.name)
         depsgraph = depsgraph_of(self.scene)
-        parts = {(part.obj, part.name): part for part in gather(depsgraph, ordered)}
+        now = {(entry.obj, entry.topology, entry.name): entry for entry in gather(depsgraph, ordered)}
         changed, copies = [], {}
-        for source, obj, description, uv in generated:
-            part = parts.get((obj, source.name))
-            if part is None or part.topology != source.topology:
-                changed.append(source.name)
+        for source, obj, parts, uv in generated:
+            scene_object = now.get((obj, source.topology, source.whole))
+            if scene_object is None:
+                changed.append(source.whole)
                 continue
-            copy = self._evaluated_copy(part, source, depsgraph)
-            self.assign(copy, source, description, uv[: len(copy.data.loops)])
-            del copy[BEFORE]
+            copy = self._evaluated_copy(scene_object, depsgraph)
+            self.assign(copy, parts, uv[: len(copy.data.loops)])
             copy[COPY_OF] = obj
             copies.setdefault(obj, []).append(copy)
         for obj, new_copies in copies.items():
@@ -189,115 +255,23 @@ class _Assignment:
             obj.hide_viewport = obj.hide_render = True
         return changed
 
-    def _evaluated_copy(self, part: Part, source: Source, depsgraph) -> bpy.types.Object:
-        """A new object with a part's evaluated faces as its mesh, in the collections of the artist's object."""
-        obj, data = part.obj, None
+    def _evaluated_copy(self, scene_object: SceneObject, depsgraph) -> bpy.types.Object:
+        """A new object with evaluated faces as its mesh, in the collections of the artist's object."""
+        obj, data = scene_object.obj, None
         matrix = obj.evaluated_get(depsgraph).matrix_world.copy()
-        if obj.type == "MESH" and len(part.pieces) == 1:  # with its own UV maps and all other layers
+        if obj.type == "MESH" and len(scene_object.pieces) == 1:  # with its own UV maps and all other layers
             data = bpy.data.meshes.new_from_object(
                 obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
             )
-            if topology_hash([faces_of(data)]) != part.topology:  # its one piece is an instance
+            if topology_hash([faces_of(data)]) != scene_object.topology:  # its one piece is an instance
                 bpy.data.meshes.remove(data)
                 data = None
         if data is None:
-            data, matrix = part.mesh(), Matrix()
+            data, matrix = scene_object.mesh(), Matrix()
         elif ATLAS_UV in data.uv_layers:
             data.uv_layers.remove(data.uv_layers[ATLAS_UV])
-        copy = bpy.data.objects.new(source.name + SUFFIX, data)
+        copy = bpy.data.objects.new(scene_object.name + SUFFIX, data)
         copy.matrix_world = matrix
         for collection in obj.users_collection:
             collection.objects.link(copy)
         return copy
-
-
-def restore(objects: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
-    """Give objects their original materials back, as before the first `own_scene.write_back`.
-
-    Parameters
-    ----------
-    objects : iterable of bpy.types.Object
-        Those without recovered materials are skipped; a copy stands for the object that it was made of.
-
-    Returns
-    -------
-    count : int
-        Objects that were restored.
-    warnings : tuple of str
-    """
-    originals = {(obj.get(COPY_OF) or obj): None for obj in objects}
-    count, edited, changed_slots = 0, [], []
-    for obj in originals:
-        backup = obj.get(BEFORE)
-        if backup is None or obj.library:
-            continue
-        count += 1
-        if "copies" in backup:
-            remove_copies(obj)
-            continue
-        current_materials = [slot.material for slot in obj.material_slots]
-        if backup.get("mesh") is not None:
-            mesh, obj.data = obj.data, backup["mesh"]
-            if not (same_topology(mesh, obj.data) and np.array_equal(vertices_of(mesh), vertices_of(obj.data))):
-                edited.append(obj.name)
-                mesh.use_fake_user = True
-            elif not mesh.users:
-                bpy.data.meshes.remove(mesh)
-        else:
-            layers = obj.data.uv_layers
-            if ATLAS_UV in layers:
-                layers.remove(layers[ATLAS_UV])
-            if "aside" in backup and PREVIOUS_UV in layers:
-                layers[PREVIOUS_UV].name = ATLAS_UV
-        old_materials = [slot_entry.get("material") for slot_entry in backup.get("slots", ())]
-        if not old_materials and len(obj.material_slots) == 1:
-            slot_indices = read(obj.data.polygons, "material_index", kind=np.int32)
-            obj.data.materials.clear()
-            if slot_indices.any():  # else an attribute would appear that was not there
-                obj.data.polygons.foreach_set("material_index", slot_indices)
-        elif len(old_materials) != len(obj.material_slots):
-            changed_slots.append(obj.name)
-        for slot, material in zip(obj.material_slots, old_materials):
-            slot.material = material
-        for key in (BEFORE, RESULT, RUN, OBJECT_ID):
-            if key in obj:
-                del obj[key]
-        remove_unused_materials(current_materials)
-    images.drop_unused({obj[RESULT] for obj in bpy.data.objects if RESULT in obj})
-    return count, sentences(
-        (edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
-        (
-            changed_slots,
-            "material slots were added or removed since; as many old materials as there are slots are back",
-        ),
-    )
-
-
-def restorable(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those that `restore` would change."""
-    return [obj for obj in objects if BEFORE in obj or COPY_OF in obj]
-
-
-def remove_copies(obj: bpy.types.Object) -> None:
-    """Remove an object's copies and restore its visibility."""
-    backup = obj.get(BEFORE)
-    if backup is None or "copies" not in backup:
-        return
-    for entry in backup["copies"]:
-        copy = entry.get("copy")
-        if copy is None:
-            continue
-        data, copy_materials = copy.data, [slot.material for slot in copy.material_slots]
-        bpy.data.objects.remove(copy)
-        if not data.users:
-            bpy.data.meshes.remove(data)
-        remove_unused_materials(copy_materials)
-    obj.hide_viewport, obj.hide_render = bool(backup["hide_viewport"]), bool(backup["hide_render"])
-    del obj[BEFORE]
-
-
-def remove_unused_materials(materials: Iterable[bpy.types.Material | None]) -> None:
-    """Remove those recovered materials that nothing uses any more."""
-    for material in {material for material in materials if material is not None}:
-        if MODEL in material and not material.users and not material.library:
-            bpy.data.materials.remove(material)

@@ -17,7 +17,7 @@ from mathutils import Vector
 
 from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.scene.sphere import fibonacci
-from ..data.arrays import triangles_of, vertices_of
+from ..data.arrays import read, triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
@@ -120,12 +120,12 @@ def _rounded_pose(obj) -> tuple:
 def _sample_points(scene) -> tuple[list, int, np.ndarray]:
     """Points, visible count and areas of a `ViewCache`; no point is on a lamp."""
     rays = [picture_ray(scene, *place) for place in PICTURE]
-    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.obj)])
+    visible_count = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):
         for direction in map(Vector, fibonacci(_ROOM_RAYS)):
             hit = cast(scene, start, direction)
-            if hit is not None and not _is_lamp(hit.obj):
+            if hit is not None and not _is_lamp(hit):
                 hits.append(hit)
                 areas.append(hit.distance**2 / max(-hit.normal.dot(direction), 0.2))
     return (
@@ -135,8 +135,8 @@ def _sample_points(scene) -> tuple[list, int, np.ndarray]:
     )
 
 
-def _is_lamp(obj) -> bool:
-    return any(relight_lamps.is_lamp(slot.material) for slot in obj.material_slots)
+def _is_lamp(hit) -> bool:
+    return relight_lamps.is_lamp(hit.material)
 
 
 def _source_strengths(scene) -> Iterator[tuple[tuple, float, float]]:
@@ -193,13 +193,15 @@ def _mean_irradiance(scene, key: tuple, areas: np.ndarray, irradiances: list[flo
 
 def _lamp_source(scene, name: str) -> Source:
     """A recovered lamp of radiance 1, by sample points on it."""
-    owner = next(
-        object_name
-        for object_name, lamps in relight_lamps.lamps_by_object(scene).items()
-        if bpy.data.materials[name] in lamps
-    )
-    data = scene.objects[owner].data
-    corners = vertices_of(data, scene.objects[owner].matrix_world)[triangles_of(data)]
+    lamp = bpy.data.materials[name]
+    owner = scene.objects[
+        next(object_name for object_name, lamps in relight_lamps.lamps_by_object(scene).items() if lamp in lamps)
+    ]
+    data, slots = owner.data, [slot.material == lamp for slot in owner.material_slots]
+    corners = vertices_of(data, owner.matrix_world)[triangles_of(data)]
+    if not all(slots):  # of a part, its faces alone
+        slot_of = read(data.loop_triangles, "material_index", kind=np.int32).clip(0, len(slots) - 1)
+        corners = corners[np.array(slots)[slot_of]]
     area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     areas = np.linalg.norm(area_vectors, axis=1)
     total_area = areas.sum()
@@ -209,7 +211,7 @@ def _lamp_source(scene, name: str) -> Source:
         max=len(areas) - 1
     )
     samples = [(Vector(corners[k].mean(0)), Vector(area_vectors[k] / areas[k])) for k in chosen]
-    two_sided = not any(node.type == "NEW_GEOMETRY" for node in bpy.data.materials[name].node_tree.nodes)
+    two_sided = not any(node.type == "NEW_GEOMETRY" for node in lamp.node_tree.nodes)
     sample_area = total_area / _LAMP_SAMPLES
 
     def irradiance(point: Vector) -> Iterator[tuple[Vector, float, float]]:

@@ -14,6 +14,7 @@ from ...core.brdf.material import renamed
 from ...core.io.files import json_if_sound
 from ...core.io.folder import MATERIALS, REPORT
 from ..custom_properties import OBJECT_ID, RESULT, RUN
+from ..data.instances import slots_of
 from ..data.materials import MODEL
 
 FITS, EARLIER, UNKNOWN, GONE = "FITS", "EARLIER", "UNTOLD", "GONE"
@@ -112,12 +113,19 @@ def result_state(obj: bpy.types.Object | None) -> tuple[str, Result | None]:
 
 
 def rows(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str, Any]]:
-    """The entry of materials.json of each object whose run is the one in its folder."""
-    return {
-        obj: result.objects[obj[OBJECT_ID]]
+    """The entry of materials.json of each object whose run is the one in its folder: of its main part."""
+    found = {obj: parts.get(obj[OBJECT_ID]) for obj, parts in rows_of_parts(objects).items()}
+    return {obj: entry for obj, entry in found.items() if entry is not None}
+
+
+def rows_of_parts(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[int, dict[str, Any]]]:
+    """The entries of each object's instances, by `object_id`, where its run is the one in its folder."""
+    found = {
+        obj: {i: result.objects[i] for i in slots_of(obj) if i in result.objects}
         for obj, (state, result) in result_states(objects).items()
-        if state == FITS and obj[OBJECT_ID] in result.objects
+        if state == FITS
     }
+    return {obj: parts for obj, parts in found.items() if parts}
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

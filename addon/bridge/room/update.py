@@ -13,6 +13,7 @@ from ..corrections import corrections
 from ..custom_properties import CAPTURE, OBJECT_ID, RESULT, RUN
 from ..data.arrays import faces_of, layer_of, read, set_layer, vertices_of
 from ..data.cameras import FRAME_INDEX, NO_FRAME
+from ..data.instances import in_slot, materials_of, slots_of
 from ..data.mesh_objects import ATLAS_UV
 from ..light import lamps as relight_lamps
 from ..own_scene.mesh import same_topology
@@ -26,13 +27,22 @@ KNOWN = "scan_relight_known"
 
 @dataclass
 class Pair:
-    """An object of the file and the new one that it takes data from."""
+    """An object of the file and the new one that it takes data from.
+
+    Attributes
+    ----------
+    corrected : frozenset of int
+        The instances whose material stays as the artist has it.
+    made : dict of int to bpy.types.Material
+        The new one's materials by instance, in the order of its slots.
+    """
 
     old: bpy.types.Object
     new: bpy.types.Object
     edited: bool = False
     same_shape: bool = False
-    corrected: bool = False
+    corrected: frozenset[int] = frozenset()
+    made: dict[int, bpy.types.Material] = field(default_factory=dict)
 
 
 @dataclass
@@ -96,7 +106,9 @@ def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[fl
             steps.added.append(obj)
     for obj in (existing for key, objects in old.items() if key not in new for existing in objects):
         yield 0.9
-        edited = obj.type == "MESH" and (is_edited(obj) or any(map(_corrected, obj.material_slots)))
+        edited = obj.type == "MESH" and (
+            is_edited(obj) or any(_corrected(slot.material) for slot in obj.material_slots)
+        )
         if edited or obj.children:
             steps.kept_removed.append(obj.name)
         else:
@@ -107,17 +119,22 @@ def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[fl
 def _compare(old: bpy.types.Object, new: bpy.types.Object) -> Pair:
     if old.type != "MESH" or new.type != "MESH":
         return Pair(old, new)
-    same = old.data.get(SHAPE) == new.data[SHAPE]
+    made = {in_slot(new, index): slot.material for index, slot in enumerate(new.material_slots)}
+    parts = list(slots_of(old))
+    same = old.data.get(SHAPE) == new.data[SHAPE] and (not old.material_slots or parts == list(made))
     # Vertex groups are the object's, their weights the mesh's.
     edited = is_edited(old) or bool(old.vertex_groups) and not same
-    slots = old.material_slots
-    worn = any(slot.material for slot in slots)
-    ours = any(is_ours(slot.material) for slot in slots)
-    return Pair(old, new, edited, same and not edited, worn and (not ours or any(map(_corrected, slots))))
+    corrected = frozenset(object_id for object_id in parts if _is_corrected(materials_of(old, object_id)))
+    return Pair(old, new, edited, same and not edited, corrected, made)
 
 
-def _corrected(slot: bpy.types.MaterialSlot) -> bool:
-    return is_ours(slot.material) and is_corrected(slot.material)
+def _is_corrected(materials: list[bpy.types.Material]) -> bool:
+    """Whether an instance with these materials wears the artist's own, or a recovered one that was changed."""
+    return bool(materials) and (not any(map(is_ours, materials)) or any(map(_corrected, materials)))
+
+
+def _corrected(material: bpy.types.Material | None) -> bool:
+    return is_ours(material) and is_corrected(material)
 
 
 def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection, shell: bpy.types.Scene) -> list[str]:
@@ -125,6 +142,7 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
     lamps = set(part_of(fresh, LAMPS).objects)
     for name in (RESULT, RUN, CAPTURE):
         top[name] = fresh[name]
+    before = corrections.instances_in([*(pair.old for pair in steps.pairs), *steps.removed])
     meshes: dict[bpy.types.Mesh, bpy.types.Mesh] = {}
     used: set[bpy.types.Mesh] = set()
     for pair in steps.pairs:
@@ -145,6 +163,8 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
     for obj in steps.added:
         collection = next((collection for collection in obj.users_collection if PART in collection), None)
         (part_of(top, collection[PART]) if collection is not None else top).objects.link(obj)
+    now = [*(pair.old for pair in steps.pairs), *steps.added]
+    corrections.carry(before, corrections.instances_in(now))
     owned = [
         datablock for obj in steps.removed for datablock in (obj.data, *(slot.material for slot in obj.material_slots))
     ]
@@ -152,7 +172,7 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
     if steps.removed:
         bpy.data.batch_remove(steps.removed)
     note_known(top, fresh.all_objects)
-    messages = [sentence for pair in steps.pairs for sentence in corrections.reapply(pair.old)]
+    messages = [sentence for obj in now for sentence in corrections.reapply(obj)]
     return _messages(steps) + messages
 
 
@@ -186,11 +206,9 @@ def _place(pair: Pair) -> None:
 
 
 def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
-    """Give an object the new mesh and material, except where the artist changed them."""
-    old, new = pair.old, pair.new
-    slot = next((candidate for candidate in old.material_slots if is_ours(candidate.material)), None)
-    worn = slot.material if slot is not None else None
-    material = new.material_slots[0].material if new.material_slots else None
+    """Give an object the new mesh and materials, except where the artist changed them."""
+    old, new, made = pair.old, pair.new, pair.made
+    worn = {i: materials_of(old, i) for i in slots_of(old)}
     data = old.data
     if pair.edited:
         atlas_onto(data, made_at(old) if PLACE in old else old.matrix_basis, new.data, made_at(new))
@@ -203,33 +221,42 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
             meshes[data] = new.data.copy() if new.data in used else new.data
             used.add(meshes[data])
         fresh = meshes[data]
-        if pair.corrected or material is None:
-            fresh.materials.clear()
-            for old_material in data.materials:
-                fresh.materials.append(old_material)
-        elif fresh != new.data or not fresh.materials:
-            fresh.materials.clear()
+        fresh.materials.clear()
+        for material in [worn[i][0] if i in pair.corrected else made[i] for i in made] or data.materials:
             fresh.materials.append(material)
         if any(polygon.use_smooth for polygon in data.polygons[:1]):  # as made it is flat
             fresh.shade_smooth()
         steps.replaced.append(data.session_uid)
         steps.names.append((fresh, data.name))
         old.data = fresh
-    if pair.corrected or material is None:
-        return
+    if made:
+        _dress_slots(pair, worn, steps)
+
+
+def _dress_slots(pair: Pair, worn: dict[int, list[bpy.types.Material]], steps: Steps) -> None:
+    """Give the slots of an object that wore the materials `worn`, by instance, the new ones."""
+    old, made = pair.old, pair.made
     if not old.material_slots:
-        old.data.materials.append(material)
-    else:
-        slot = next(
-            (candidate for candidate in old.material_slots if candidate.material in (worn, material)),
-            old.material_slots[0],
-        )
-        slot.material = material
-    if worn is not None and worn != material:
-        if relight_lamps.is_lamp(worn) and relight_lamps.is_lamp(material):
-            relight_lamps.carry(worn, material)
-        steps.replaced.append(worn.session_uid)
-        steps.names.append((material, worn.name))
+        for material in made.values():
+            old.data.materials.append(material)
+    for object_id, indices in slots_of(old).items():
+        # What is no part any more belongs to the whole again.
+        material = made.get(object_id, made[old[OBJECT_ID]])
+        before = [other for other in worn.get(object_id, ()) if is_ours(other)][:1]
+        if object_id in pair.corrected or not indices:
+            continue
+        replaced = [index for index in indices if old.material_slots[index].material in (*before, material)]
+        for index in replaced or indices[:1]:
+            old.material_slots[index].material = material
+    for object_id, materials in worn.items():
+        before, material = next(filter(is_ours, materials), None), made.get(object_id)
+        if object_id in pair.corrected or before is None or before == material:
+            continue
+        steps.replaced.append(before.session_uid)
+        if material is not None:
+            if relight_lamps.is_lamp(before) and relight_lamps.is_lamp(material):
+                relight_lamps.carry(before, material)
+            steps.names.append((material, before.name))
 
 
 def _sort(obj: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:

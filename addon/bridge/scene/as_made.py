@@ -11,6 +11,7 @@ from contextlib import contextmanager
 import bpy
 from mathutils import Matrix
 
+from ..custom_properties import OBJECT_ID
 from ..data.arrays import faces_of, vertices_of
 from ..data.materials import MODEL
 from ..data.mesh_objects import ATLAS_UV, CAPTURE_UV
@@ -72,8 +73,9 @@ def shape(data: bpy.types.Mesh) -> str:
 def is_edited(obj: bpy.types.Object) -> bool:
     """Whether an object has another mesh than the one it was made with, or one with the artist's data on it."""
     data = obj.data
+    own_slots = [material for material in data.materials if material is None or OBJECT_ID not in material]
     added = any(not layer.name.startswith(".") and layer.name not in _BUILT_IN for layer in data.attributes)
-    return added or data.shape_keys is not None or len(data.materials) > 1 or data.get(SHAPE) != shape(data)
+    return added or data.shape_keys is not None or len(own_slots) > 1 or data.get(SHAPE) != shape(data)
 
 
 def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:

@@ -5,6 +5,7 @@ import math
 import os
 from collections.abc import Iterable
 from contextlib import nullcontext, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,14 +18,14 @@ from ...core.io.folder import SCENE
 from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import openings_of, run_of
-from ...core.scene.model import Capture
-from ..custom_properties import OWN_SCENE, set_run
+from ...core.scene.model import Capture, Instance
+from ..custom_properties import OBJECT_ID, OWN_SCENE, set_run
 from ..data.added import scene_apart
 from ..data.arrays import make_mesh
 from ..data.cameras import best_view, lens_warning, make_cameras, make_track, make_view, size_warning, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import let_light_through, make_material
-from ..data.mesh_objects import each_object, is_open
+from ..data.mesh_objects import by_object, each_object, is_open
 from ..data.nodes import make_world
 from ..refused import refused
 from .as_made import stamp, stamp_tree
@@ -58,24 +59,27 @@ def _build(
     top = new_room(capture.root)
     room, lamps, camera_collection = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
-    objects = dict(each_object(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv))
+    descriptions = {m.object_id: m for m in materials}
+    instances = _lamps_apart(capture.instances, descriptions)
+    objects = dict(each_object(capture.mesh, instances, atlas_uv, room, parts and parts.uv))
     run = run_of(folder)
     for owner in (top, *objects.values()):
         set_run(owner, folder, run, capture.root)
-    descriptions = {m.object_id: m for m in materials}
     own_images = load_parts(folder, parts.images, capture.root.name, descriptions) if parts else {}
-    for instance in capture.instances:
-        if instance.object_id not in objects:
-            continue
-        obj = objects[instance.object_id]
-        description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
-        one_sided = description.model.gives_light and is_open(obj.data)
-        base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
-        obj.data.materials.append(make_material(description, base_color, one_sided=one_sided))
-        if description.model.gives_light:
-            room.objects.unlink(obj)
-            lamps.objects.link(obj)
-        stamp(obj, instance.name)
+    for object_id, of_object in by_object(capture.mesh, instances).items():
+        obj = objects[object_id]
+        for instance in of_object:
+            description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
+            one_sided = description.model.gives_light and is_open(obj.data)
+            base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
+            material = make_material(description, base_color, one_sided=one_sided)
+            if instance.object_id != object_id:
+                material[OBJECT_ID] = instance.object_id
+            obj.data.materials.append(material)
+            if description.model.gives_light:
+                room.objects.unlink(obj)
+                lamps.objects.link(obj)
+        stamp(obj, of_object[0].name)
     panels = make_openings(folder, lamps)
     cameras = make_cameras(capture.frames, camera_collection)
     track = make_track(cameras, camera_collection)
@@ -94,6 +98,15 @@ def _build(
     hide_cameras(scene, top)
     warnings = tuple(filter(None, (size_warning(capture.frames), lens_warning(capture.frames))))
     return [*images.values(), *dict.fromkeys(own_images.values())], warnings
+
+
+def _lamps_apart(instances: Iterable[Instance], descriptions: dict[int, ObjectMaterial]) -> list[Instance]:
+    """The instances; what gives light neither is a part nor has any: a lamp is an object in a collection of its own."""
+    lamps = {object_id for object_id, description in descriptions.items() if description.model.gives_light}
+    return [
+        replace(instance, part_of=None) if lamps & {instance.object_id, instance.part_of} else instance
+        for instance in instances
+    ]
 
 
 def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.types.Object]:

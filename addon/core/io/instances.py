@@ -1,5 +1,6 @@
 """Which object each triangle belongs to: names from `info_semantic.json`, and what to do where they don't agree."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,23 @@ def assign(
             f"their own, 'unlabelled' (object_id {number})."
         )
     return result.astype(np.int32), tuple(instances), warnings
+
+
+def with_parts(instances: tuple[Instance, ...], path: Path) -> tuple[tuple[Instance, ...], list[str]]:
+    """The instances, each `part_of` the one that its entry in the file `path` names, and warnings.
+
+    A part has to name an instance that is no part itself; else it stays an object of its own.
+    """
+    entries = {item["id"]: item["part_of"] for item in read_json(path)["objects"] if item.get("part_of") is not None}
+    wholes = {instance.object_id for instance in instances} - set(entries)
+    parts = {i: whole for i, whole in entries.items() if type(whole) is int and whole in wholes}
+    wrong = [f"{i.object_id} ({i.class_name})" for i in instances if i.object_id in entries.keys() - parts.keys()]
+    warnings = [
+        f"{len(wrong)} of the objects in {path.name} are 'part_of' what is no whole object of the capture, and stay "
+        f"objects of their own: {_few(wrong)}."
+    ]
+    linked = tuple(replace(instance, part_of=parts.get(instance.object_id)) for instance in instances)
+    return linked, warnings if wrong else []
 
 
 def _few(items: list[str]) -> str:

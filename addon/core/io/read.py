@@ -55,7 +55,7 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     layout = reader.read(root, reading)
     listed = root / instances.FILE
     if layout.names is None and listed.exists():
-        layout = replace(layout, names=instances.read_instances(listed))
+        layout = replace(layout, names=instances.read_instances(listed), names_file=instances.FILE)
     # Told before any header is looked at: of a hundred thousand frames that takes minutes.
     missing = [(frame.path, what) for frame in layout.frames if (what := absence(frame.path))]
     absent = [f"Picture '{path}' {what}; check the capture's paths." for path, what in missing]
@@ -65,6 +65,9 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     frames, more = _usable(root, _exposed(layout, reading), reading.outside)
     frames, grouped = group_brackets(frames)
     mesh, objects, warnings = _objects(layout, frames)
+    if layout.names is not None and Path(layout.names_file).name == instances.FILE:
+        objects, notes = instances.with_parts(objects, root / layout.names_file)
+        warnings += notes
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
     frames = fold(frames, clipped)
     notes = [*grouped, *_chosen(frames), *notes]

@@ -97,7 +97,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
     metadata = {
         "root": str(capture.root.absolute()),
         "format": capture.format,
-        "instances": [[instance.object_id, instance.class_name, instance.guess] for instance in capture.instances],
+        "instances": [[i.object_id, i.class_name, i.guess, i.part_of] for i in capture.instances],
         "frames": [
             [
                 frame.name,
@@ -164,7 +164,7 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         frames = tuple(
             replace(frame, **_picture_from_json(picture)) for frame, picture in zip(frames, pictures, strict=True)
         )
-        instances = tuple(Instance(int(number), name, *guess) for number, name, *guess in metadata["instances"])
+        instances = tuple(Instance(int(number), name, *more) for number, name, *more in metadata["instances"])
         whole = all(instance.guess for instance in instances)
         mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"), whole=whole)
         return Capture(Path(metadata["root"]), mesh, instances, frames, format=metadata["format"]), arrays["atlas_uv"]

@@ -51,12 +51,13 @@ def write_result(folder, entries=ENTRIES, run=RUN):
     (folder / "materials.json").write_text(json.dumps({"run": run, "capture": "room", "objects": entries}))
 
 
-def build(folder):
-    """The room in the open scene, by object id; nothing is selected."""
+def build(folder, part_of=None):
+    """The room in the open scene, by object id; nothing is selected. `part_of`: of what each part is one."""
     from addon.core.results.room_file import material
     from addon.core.scene.model import Instance, Mesh
 
     write_result(folder)
+    part_of = part_of or {}
     vertices, triangles, owner, uv = [], [], [], []
     for k, entry in enumerate(ENTRIES):
         low = np.float32([k % 2, k // 2]) * 0.5
@@ -67,14 +68,17 @@ def build(folder):
         owner += [entry["object_id"]] * 2
     mesh = Mesh(np.float32(vertices), np.int32(triangles), np.int32(owner))
     instances, collection = (
-        [Instance(one["object_id"], one["class_name"]) for one in ENTRIES],
+        [Instance(one["object_id"], one["class_name"], part_of=part_of.get(one["object_id"])) for one in ENTRIES],
         bpy.context.scene.collection,
     )
     objects = dict(bridge("data.mesh_objects").each_object(mesh, instances, np.float32(uv), collection))
     image = bridge("results.images").image(folder, "base_color.exr")
     for entry in ENTRIES:
-        thing = objects[entry["object_id"]]
+        whole = part_of.get(entry["object_id"])
+        thing = objects[entry["object_id"] if whole is None else whole]
         thing.data.materials.append(bridge("data.materials").make_material(material(entry), image))
+        if whole is not None:
+            thing.data.materials[-1]["object_id"] = entry["object_id"]
         bridge("custom_properties").set_run(thing, folder, RUN)
     bpy.context.view_layer.update()
     return objects

@@ -113,6 +113,7 @@ def test_there_and_back(ops, room, tmp_path):
         assert state({name: thing})[name]["indices"] == before[name]["indices"]
         assert state({name: thing})[name]["corners"] == before[name]["corners"]
     assert room["chair"].data != room["chair.001"].data
+    assert len({slot.material for slot in room["table"].material_slots}) == 3  # each slot is a part
     old = bpy.data.materials["red"]
     assert ops.restore_materials() == {"FINISHED"}
     assert state(room) == before
@@ -177,7 +178,7 @@ def test_slots_and_shapes_that_changed_after_writing(ops, room, tmp_path):
     room["chair"].data.vertices[0].co.z += 0.1
     edited = room["chair"].data
     room["mirrored"].data.materials.append(None)
-    restore = bridge("own_scene.write_back").restore
+    restore = bridge("own_scene.restore").restore
     count, warnings = restore([room["chair"], room["mirrored"]])
     assert count == 2 and "Object 'chair': edited since" in warnings[0] and "slots were added" in warnings[1]
     assert edited.use_fake_user and room["chair"].data == bpy.data.meshes["chair"]

@@ -40,11 +40,12 @@ def normals(mesh, chosen):
 def test_objects_and_their_places(room, tmp_path):
     capture, warnings = captured(tmp_path / "capture", room.values())
     names = {source.object_id: source for source in sources(tmp_path / "capture")}
-    assert [names[one.object_id].name for one in capture.instances] == sorted(
-        [*(set(room) - {"shelf"}), "shelf/board 0", "shelf/board 1"]
-    )
-    for one in capture.instances:
-        source, own = names[one.object_id], capture.mesh.object_id == one.object_id
+    wholes = [names[one.object_id] for one in capture.instances if one.part_of is None]
+    assert [source.whole for source in wholes] == sorted([*(set(room) - {"shelf"}), "shelf/board 0", "shelf/board 1"])
+    for source in wholes:
+        parts = [one.object_id for one in capture.instances if source.object_id in (one.object_id, one.part_of)]
+        own = np.isin(capture.mesh.object_id, parts)
+        assert len(parts) == (3 if source.thing == "table" else 1)
         thing = bpy.context.scene.objects[source.thing]
         corners = capture.mesh.vertices[np.unique(capture.mesh.triangles[own])]
         if source.own and not thing.modifiers:

@@ -59,3 +59,20 @@ def test_without_own_coordinates(scene, mesh):
     bare = Mesh(mesh.vertices, mesh.triangles, mesh.object_id)
     objects = dict(each_object(bare, INSTANCES, mesh.uv, scene.collection))
     assert [u.name for u in objects[2].data.uv_layers] == [ATLAS_UV]
+
+
+def test_parts_are_slots_of_what_they_are_part_of(scene, mesh):
+    atlas = np.random.default_rng(1).random((60, 3, 2)).astype(np.float32)
+    instances = (Instance(2, "Leg", part_of=7), Instance(5, "Foot", part_of=2), Instance(7, "Table"))
+    [(object_id, thing)] = each_object(mesh, instances, atlas, scene.collection)
+    assert object_id == thing["object_id"] == 7 and thing.name == "Table 7" and len(bpy.data.meshes) == 1
+    slots = np.array([face.material_index for face in thing.data.polygons])
+    for slot, part in enumerate((7, 2, 5)):
+        np.testing.assert_array_equal(read(thing.data, ATLAS_UV)[slots == slot], atlas[mesh.object_id == part])
+    assert len(thing.data.vertices) == len(np.unique(mesh.triangles)), "they share the vertices of the seam"
+
+
+def test_a_part_of_what_has_no_triangles_is_an_object(scene, mesh):
+    instances = (Instance(2, "Leg", part_of=8), *INSTANCES[1:])
+    objects = dict(each_object(mesh, instances, mesh.uv, scene.collection))
+    assert [o.name for o in objects.values()] == ["Leg 2", "Sofa 5", "Wall 7"]

@@ -482,3 +482,24 @@ def test_tiny_frames_and_strips_are_looked_at(tmp_path, size):
     from tests.hostile.load import boxes, write
 
     assert look(read_capture(write(tmp_path / "capture", boxes(3), 4, size)), read_pixels).sentence().endswith(".")
+
+
+def test_parts_of_objects(capture):
+    sides = [{"id": i, "class_name": f"side {i}"} for i in range(6)]
+    sides[2]["part_of"] = sides[3]["part_of"] = 0
+    capture.objects({"objects": sides})
+    read = read_capture(capture.root)
+    assert [instance.part_of for instance in read.instances] == [None, None, 0, 0, None, None]
+    assert not any("part_of" in text for text in read.warnings)
+
+
+@pytest.mark.parametrize("whole", [True, 1.0, "0", [0], 9, 2, 3], ids=str)
+def test_a_part_of_nothing_whole_stays_an_object(capture, whole):
+    """As are: no whole number, no object of the capture, itself, a part."""
+    sides = [{"id": i, "class_name": f"side {i}"} for i in range(6)]
+    sides[2]["part_of"], sides[3]["part_of"] = whole, 0
+    capture.objects({"objects": sides})
+    read = warned(
+        capture, "'part_of' what is no whole object of the capture, and stay objects of their own: 2 (side 2)"
+    )
+    assert [instance.part_of for instance in read.instances] == [None, None, None, 0, None, None]
