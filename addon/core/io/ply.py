@@ -86,7 +86,7 @@ def read_ply(path: Path) -> PlyMesh:
     BadInputError
         The file is absent, damaged, cut off, holds no mesh, or points to vertices that it doesn't hold.
     """
-    with _told(path):
+    with _one_sentence(path):
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
         return _mesh(_records(read_bytes(path, "Mesh ")))
@@ -105,7 +105,7 @@ def read_columns(path: Path, groups: Sequence[tuple[str, ...]]) -> dict[str, np.
     BadInputError
         The file can't be read, or is damaged.
     """
-    with _told(path):
+    with _one_sentence(path):
         found = {}
         for name, records in _records(read_bytes(path)).items():
             columns = (records.columns(group) for group in groups)
@@ -114,7 +114,7 @@ def read_columns(path: Path, groups: Sequence[tuple[str, ...]]) -> dict[str, np.
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _one_sentence(path: Path) -> Iterator[None]:
     try:
         yield
     except ValueError as error:  # its text is the second half of a sentence
