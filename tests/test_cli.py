@@ -107,6 +107,18 @@ def test_info_as_json(grey_capture, capsys):
     assert json.loads(capsys.readouterr().out)["frames"] == 3
 
 
+def test_segments_reach_the_reader(grey_capture, tmp_path, capsys):
+    assert cli.main(["info", str(grey_capture), "--json", "--no-look", "--segments", "shape"]) == 0
+    assert any("By its shape" in one for one in json.loads(capsys.readouterr().out)["warnings"])
+    for given, told in (
+        ("materials", "has no materials"),
+        (str(tmp_path / "no.txt"), "does not exist; give --segments"),
+    ):
+        assert cli.main(["info", str(grey_capture), "--segments", given]) == 2
+        err = capsys.readouterr().err
+        assert told in err and err.count("\n") == 1
+
+
 def test_info_of_nothing(tmp_path, capsys):
     assert cli.main(["info", str(tmp_path / "nowhere")]) == 2
     err = capsys.readouterr().err

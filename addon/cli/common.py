@@ -12,6 +12,7 @@ from typing import TextIO
 
 from ..console import ConsoleProgress, StopSignal
 from ..core.errors import EXIT_FAILURE, BadInputError
+from ..core.io.formats import MATERIALS, SHAPE
 from ..core.settings import PRESETS, Settings
 from ..leash import JsonProgress, Leash, MemoryGuard
 from ..settings_info import setting_infos
@@ -32,6 +33,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     add("--transfer", metavar="CURVE", default="", help=curves)
     add("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
     add("--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it")
+    what = f"the mesh's objects: a file of ids (.txt, .csv, .npy, .ply), '{MATERIALS}' or '{SHAPE}' (docs/captures.md)"
+    add("--segments", metavar="WHAT", default="", type=_segments, help=what)
+
+
+def _segments(text: str) -> Path | str:
+    return text if text in ("", MATERIALS, SHAPE) else Path(text)
 
 
 def reading_from(arguments: argparse.Namespace):

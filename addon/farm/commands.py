@@ -109,9 +109,10 @@ def options_of(arguments: argparse.Namespace) -> list[str]:
             given.append(f"--{'' if value else 'no-'}{option}" if info.kind is bool else f"--{option}={value}")
     given += [f"--without={name}" for name in arguments.without or ()]
     texts = {name: getattr(arguments, name) for name in ("format", "transfer", "convention", "white", "unwrap")}
-    paths = {name: getattr(arguments, name) for name in ("mesh", "exposures", "override")}
+    paths = {name: getattr(arguments, name) for name in ("mesh", "exposures", "segments", "override")}
     given += [f"--{name}={text}" for name, text in texts.items() if text]
-    given += [f"--{name}={path.absolute()}" for name, path in paths.items() if path]
+    absolute = {name: path.absolute() if isinstance(path, Path) else path for name, path in paths.items()}
+    given += [f"--{name}={path}" for name, path in absolute.items() if path]
     flags = {"outside": arguments.outside, "no-scene": not arguments.scene, "no-overrides": arguments.no_overrides}
     return given + [f"--{flag}" for flag, wanted in flags.items() if wanted]
 

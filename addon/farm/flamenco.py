@@ -19,7 +19,7 @@ JOB_TYPE: Code[str] = "scan-relight"
 MANAGER: Code[str] = "http://localhost:8080/"
 TIMEOUT: Shown[float] = 30.0
 """How long the manager may take for an answer."""
-PATHS = ("mesh", "exposures", "override")
+PATHS = ("mesh", "exposures", "segments", "override")
 MAX_ANSWER_BYTES: Shown[int] = 1 << 24
 """Bytes of an answer that are read."""
 NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."

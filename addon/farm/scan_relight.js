@@ -20,13 +20,14 @@ const JOB_TYPE = {
         // Paths have settings of their own, as the manager puts its two-way variables only where a value begins with one.
         { key: "mesh", type: "string", subtype: "file_path", visible: "submission", description: "As --mesh" },
         { key: "exposures", type: "string", subtype: "file_path", visible: "submission", description: "As --exposures" },
+        { key: "segments", type: "string", subtype: "file_path", visible: "submission", description: "As --segments" },
         { key: "override", type: "string", subtype: "file_path", visible: "submission", description: "As --override" },
     ],
 };
 
 const STAGES = ["surface", "lit_diffuse", "shading", "specular", "write"];
 const DIVIDED = ["specular"];
-const PATHS = ["mesh", "exposures", "override"];
+const PATHS = ["mesh", "exposures", "segments", "override"];
 
 function compileJob(job) {
     const settings = job.settings;

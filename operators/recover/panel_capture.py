@@ -28,7 +28,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         if not choices.capture_folder:
             self.say(layout, "Choose the folder of a scan: its mesh, its HDR frames and their poses.", "INFO")
         if body := folded(layout, "reading", "How it is read"):
-            fields(body, choices.reading, *reading_props.NAMES)
+            fields(body, choices.reading, *reading_props.visible_names(choices.reading))
         wrong = findings.wrong_folder(choices)
         if wrong is not None:
             self.wrong(layout, context, wrong)

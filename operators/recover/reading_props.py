@@ -4,12 +4,12 @@ from pathlib import Path
 
 import bpy
 
-from ...addon.core.io.formats import FORMATS
+from ...addon.core.io.formats import FORMATS, MATERIALS, SHAPE
 from ...addon.core.io.layout import Reading
 from ..base.operator import file_property
 from ..translations import OWN
 
-FOUND = "FOUND"
+FOUND, FILE = "FOUND", "FILE"
 FORMAT_ITEMS = [
     (FOUND, "From the Folder", "Find the format from what the folder holds"),
     *((name, name, f"Known by {wants}") for name, wants in FORMATS.items()),
@@ -18,6 +18,12 @@ CURVES = (
     (FOUND, "Calibrated", "Response and exposures are estimated from what several pictures show"),
     ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
     ("linear", "Linear", "Stored numbers are proportional to light"),
+)
+SEGMENTS = (
+    (FOUND, "As the Capture Tells", "What the mesh or pictures of ids tell, else the mesh's shape"),
+    (MATERIALS, "Materials", "Each material of an OBJ or glTF mesh is an object"),
+    (SHAPE, "Shape", "Take the mesh apart by its shape, whatever the capture tells"),
+    (FILE, "File", "A file tells the object of each face"),
 )
 
 
@@ -40,9 +46,20 @@ class ReadingProps:
     reading_convention: bpy.props.StringProperty(
         name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"
     )
+    reading_segments: bpy.props.EnumProperty(
+        name="Objects", description="What tells which object each face of the mesh belongs to", items=SEGMENTS
+    )
+    reading_segments_file: file_property(
+        "Segments", "A number for each face of the mesh (.txt, .csv or .npy), or the mesh painted by objects (.ply)"
+    )
 
 
 NAMES = tuple(ReadingProps.__annotations__)
+
+
+def visible_names(owner) -> list[str]:
+    """The properties that mean something beside `owner`'s others."""
+    return [name for name in NAMES if name != "reading_segments_file" or owner.reading_segments == FILE]
 
 
 def reading(owner) -> Reading:
@@ -56,6 +73,7 @@ def reading(owner) -> Reading:
     def file(path: str) -> Path | None:
         return Path(bpy.path.abspath(path)) if path else None
 
+    segments = owner.reading_segments
     return Reading(
         "" if owner.reading_format == FOUND else owner.reading_format,
         file(owner.reading_mesh),
@@ -63,6 +81,7 @@ def reading(owner) -> Reading:
         "" if owner.reading_transfer == FOUND else owner.reading_transfer,
         file(owner.reading_exposures),
         owner.reading_convention,
+        (file(owner.reading_segments_file) or Path()) if segments == FILE else "" if segments == FOUND else segments,
         import_mesh,
     )
 
@@ -70,6 +89,7 @@ def reading(owner) -> Reading:
 def options(owner) -> list[str]:
     """`owner`'s properties as options of the command line."""
     requested = reading(owner)
-    values = {name: getattr(requested, name) for name in ("format", "mesh", "transfer", "exposures", "convention")}
+    names = ("format", "mesh", "transfer", "exposures", "convention", "segments")
+    values = {name: getattr(requested, name) for name in names}
     words = [word for name, value in values.items() if value for word in (f"--{name}", str(value))]
     return [*words, "--outside"] if requested.outside else words

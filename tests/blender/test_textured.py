@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -117,3 +119,13 @@ def test_a_texture_that_goes_during_the_run(lit, tmp_path):
         lit_from_picture(mesh, mesh.lit, room.atlas)
     with pytest.raises(BadInputError, match="changed during the run"):
         texel_edge(mesh, mesh.lit)
+
+
+def test_segments_of_a_textured_mesh(lit, tmp_path):
+    room, light = lit
+    write_textured(tmp_path / "scan", room, light)
+    read = read_capture(tmp_path / "scan", replace(READING, segments="materials"))
+    assert [one.class_name for one in read.instances] == ["material_0"] and not read.instances[0].guess
+    (tmp_path / "ids.txt").write_text("\n".join(map(str, room.mesh.object_id)))
+    read = read_capture(tmp_path / "scan", replace(READING, segments=tmp_path / "ids.txt"))
+    assert np.array_equal(read.mesh.object_id, room.mesh.object_id) and read.mesh.lit is not None

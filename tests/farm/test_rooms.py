@@ -47,14 +47,15 @@ def test_all_options_reach_the_units(tmp_path, capsys):
         "--format=nerfstudio",
         "--white=wall",
     ]
-    paths = [f"--{name}={tmp_path / name}" for name in ("mesh", "exposures", "override")]
+    paths = [f"--{name}={tmp_path / name}" for name in ("mesh", "exposures", "segments", "override")]
     [room] = plan(capsys, "capture", "--out", tmp_path, *given, *paths)
     argv = room["tasks"][0]["command"][1:]
     parser = cli.make_parser()
     direct = parser.parse_args(["stage", "c", "--out", "r", "--stage", "surface", *given, *paths])
     arrived = parser.parse_args(argv)
     assert settings_from(arrived) == settings_from(direct) and settings_from(direct).seed == 7
-    names = ("format", "mesh", "outside", "transfer", "exposures", "convention", "white", "scene", "unwrap", "override")
+    names = ("format", "mesh", "outside", "transfer", "exposures", "segments", "convention", "white", "scene", "unwrap",
+             "override")  # fmt: skip
     assert [getattr(arrived, one) for one in names] == [getattr(direct, one) for one in names]
     assert arrived.no_overrides
 

@@ -62,7 +62,7 @@ def of_case(case: cases.Case) -> Reader:
 
     def read(root: Path) -> None:
         reading = Reading(exposures=root / case.victim) if case.name == "exposures" else case.reading
-        capture(root, reading if reading.mesh is None else Reading(mesh=root / reading.mesh))
+        capture(root, cases.placed(reading, root))
 
     return Reader(make, read)
 

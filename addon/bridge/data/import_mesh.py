@@ -2,6 +2,7 @@
 
 import re
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from ...core.errors import BadInputError
 from ...core.io.gltf_nodes import Placed
-from ...core.io.layout import RawMesh
-from ...core.io.self_contained import copy_gltf, copy_obj
+from ...core.io.layout import Faces, RawMesh
+from ...core.io.self_contained import Copy, copy_gltf, copy_obj
 from ..refused import reason_of
 from .added import scene_apart
 from .arrays import layer_of, read, triangles_of, vertices_of
@@ -37,9 +38,11 @@ def import_mesh(path: Path) -> RawMesh:
             tempfile.TemporaryDirectory(prefix="scan_relight_") as folder,
             scene_apart("Scan Relight import") as (scene, added),
         ):
-            placed = _import(path, Path(folder), scene)
+            copy = _import(path, Path(folder), scene)
             scene.view_layers[0].update()  # world matrices
-            parts = _parts(added.new("objects"), placed)  # not all_objects: making that list takes its length squared
+            parts = _parts(
+                added.new("objects"), copy.placed
+            )  # not all_objects: making that list takes its length squared
     except OSError as error:
         reason = error.strerror or error
         raise BadInputError(
@@ -49,25 +52,27 @@ def import_mesh(path: Path) -> RawMesh:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
     if not parts:
         raise BadInputError(f"Mesh '{path}' holds no surface that Blender can read; export it again.")
-    return _joined(parts, path.name)
+    return _joined(parts, path.name, copy)
 
 
-def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
-    """Run Blender's importer on a copy of `path` that refers to no other file; name and transform of each 'part N'."""
+def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> Copy:
+    """Run Blender's importer on a copy of `path` that refers to no other file."""
     with in_window(scene):
         try:
             if path.suffix.lower() == ".obj":
-                copy, named, placed = copy_obj(path, folder)
-                split = {"use_split_objects": named, "use_split_groups": not named}
-                bpy.ops.wm.obj_import(filepath=str(copy), forward_axis="Y", up_axis="Z", validate_meshes=True, **split)
-                return placed
-            copy, placed = copy_gltf(path, folder)
+                copy = copy_obj(path, folder)
+                split = {"use_split_objects": copy.named, "use_split_groups": not copy.named}
+                bpy.ops.wm.obj_import(
+                    filepath=str(copy.path), forward_axis="Y", up_axis="Z", validate_meshes=True, **split
+                )
+                return copy
+            copy = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off
                 import addon_utils
 
                 addon_utils.enable("io_scene_gltf2")
-            bpy.ops.import_scene.gltf(filepath=str(copy), import_shading="FLAT", merge_vertices=False)
-            return placed
+            bpy.ops.import_scene.gltf(filepath=str(copy.path), import_shading="FLAT", merge_vertices=False)
+            return copy
         except (RuntimeError, AttributeError) as error:  # how an operator reports any failure
             raise BadInputError(
                 f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
@@ -75,13 +80,19 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
 
 
 class _Part(NamedTuple):
-    """World positions (v, 3) float64, triangles (t, 3), texture coordinates (t, 3, 2) if any, materials (t,)."""
+    """World positions (v, 3) float64, triangles (t, 3), texture coordinates (t, 3, 2) if any, materials (t,).
+
+    `face` is the polygon of each triangle, (t,), of `polygons`; in the file come `first` faces before.
+    """
 
     name: str
     vertices: np.ndarray
     triangles: np.ndarray
     uv: np.ndarray | None
     material: np.ndarray
+    face: np.ndarray
+    polygons: int
+    first: int
 
 
 def _parts(objects: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
@@ -97,13 +108,15 @@ def _parts(objects: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]
         layer, match = obj.data.uv_layers.active, PART.match(obj.name)
         uv = layer and layer_of(obj.data, layer.name)[triangles_of(obj.data, "loops")]
         vertices, material = vertices_of(obj.data, obj.matrix_world), _materials(obj.data)
+        face = read(obj.data.loop_triangles, "polygon_index", kind=np.int32), len(obj.data.polygons)
         unnamed = [(len(parts), Placed(0, obj.name, np.eye(4)))]
         for order, placement in places.get(int(match[1]), unnamed) if match else unnamed:
             corners = triangles, uv
             if np.linalg.det(placement.matrix[:3, :3]) < 0:  # its triangles are wound the other way
                 corners = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
             name, number = split_number(placement.name)
-            part = _Part(name, vertices @ placement.matrix[:3, :3].T + placement.matrix[:3, 3], *corners, material)
+            moved = vertices @ placement.matrix[:3, :3].T + placement.matrix[:3, 3]
+            part = _Part(name, moved, *corners, material, *face, placement.first)
             parts.append(((name, number, order), part))
     return [part for _, part in sorted(parts, key=lambda item: item[0])]
 
@@ -115,7 +128,17 @@ def _materials(data: bpy.types.Mesh) -> np.ndarray:
     return number[np.clip(read(data.loop_triangles, "material_index", kind=np.int32), 0, len(number) - 1)]
 
 
-def _joined(parts: list[_Part], name: str) -> RawMesh:
+def _faces(parts: list[_Part], count: int) -> Faces:
+    """Where the parts' polygons are among the file's faces, if all of those became one."""
+    begin, in_order = 0, True
+    for part in sorted(parts, key=lambda part: part.first):
+        in_order &= part.first == begin
+        begin += part.polygons
+    face = np.concatenate([part.face + part.first for part in parts])
+    return Faces(count if in_order and begin == count else -1, face, own_vertices=False)
+
+
+def _joined(parts: list[_Part], name: str, copy: Copy) -> RawMesh:
     begin = np.cumsum([0, *(len(part.vertices) for part in parts)])
     vertices = np.concatenate([part.vertices for part in parts])
     triangles = np.concatenate([part.triangles + first for part, first in zip(parts, begin)]).astype(np.int32)
@@ -123,9 +146,9 @@ def _joined(parts: list[_Part], name: str) -> RawMesh:
     if any(part.uv is not None for part in parts):
         blank = [np.zeros((len(part.triangles), 3, 2), np.float32) for part in parts]
         uv = np.concatenate([zeros if part.uv is None else part.uv for part, zeros in zip(parts, blank)])
-    material = np.concatenate([part.material for part in parts])
+    material, faces = np.concatenate([part.material for part in parts]), _faces(parts, copy.faces)
+    mesh = RawMesh(vertices, triangles, None, uv, None, name, None, material, copy.materials, faces)
     if len(parts) == 1:
-        return RawMesh(vertices, triangles, uv=uv, name=name, material=material)
+        return mesh
     ids = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
-    names = {i: part.name for i, part in enumerate(parts)}
-    return RawMesh(vertices, triangles, ids, uv, names, name, material=material)
+    return replace(mesh, object_id=ids, names={i: part.name for i, part in enumerate(parts)})

@@ -1,4 +1,4 @@
-"""Names of the formats and the files by which a user knows each: what Blender needs of them as it starts."""
+"""Names of the formats and the files by which a user knows each, and of segments: what is needed before NumPy is."""
 
 FORMATS = {
     "replica": "textures/parameters.json beside mesh.ply",
@@ -14,3 +14,5 @@ FORMATS = {
     "textured": "one textured mesh (.glb, .gltf or .obj) alone",
 }
 """In the order of `readers.READERS`."""
+MATERIALS, SHAPE = "materials", "shape"
+"""What segments can be, other than a file of them."""

@@ -17,11 +17,24 @@ TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 class Placed(NamedTuple):
-    """A mesh as a node has it: its number, the node's name ('' for none), and to the world, +Z up, (4, 4) float64."""
+    """A mesh as a node has it.
+
+    Attributes
+    ----------
+    mesh : int
+        Its number.
+    name : str
+        The node's, '' for none.
+    matrix : (4, 4) float64
+        To the world, +Z up.
+    first : int
+        How many faces the file has before it.
+    """
 
     mesh: int
     name: str
     matrix: np.ndarray
+    first: int = 0
 
 
 def placed_meshes(nodes: list[dict[str, Any]], meshes: int, path: Path) -> list[Placed]:

@@ -37,6 +37,8 @@ class Reading:
         CSV of exposures, one line a frame.
     convention : str
         Name of a correction of all poses; '' takes them as they are.
+    segments : Path or str
+        What tells the mesh's objects: a file of ids (`segments.py`), 'materials' or 'shape'; '' takes what is there.
     import_mesh : callable(Path) -> RawMesh, or None
         Reads what the core has no reader for (glTF, OBJ and others through Blender); None refuses such meshes.
     """
@@ -47,10 +49,29 @@ class Reading:
     transfer: str = ""
     exposures: Path | None = None
     convention: str = ""
+    segments: Path | str = ""
     import_mesh: Callable[[Path], RawMesh] | None = field(default=None, compare=False)
 
 
 AS_FOUND = Reading()
+
+
+class Faces(NamedTuple):
+    """How a mesh's file counts its faces.
+
+    Attributes
+    ----------
+    total : int
+        How many it has, those without triangles too; -1 where their order can't be told.
+    of_triangle : (t,) int
+        The face that each triangle is part of.
+    own_vertices : bool
+        Whether the mesh has the file's vertices in the file's order.
+    """
+
+    total: int
+    of_triangle: np.ndarray
+    own_vertices: bool
 
 
 @dataclass(frozen=True)
@@ -72,6 +93,10 @@ class RawMesh:
         Light stored on it.
     material : (t,) int32 or None
         Number of each triangle's material in the file, as `base_colour` counts them; -1 none. Only for readers.
+    material_names : tuple of str
+        In the file; '' for none.
+    faces : Faces or None
+        None: each triangle is a face of the file, and the vertices are its own.
     """
 
     vertices: np.ndarray
@@ -82,6 +107,8 @@ class RawMesh:
     name: str = "mesh"
     lit: LitTiles | LitTexture | None = None
     material: np.ndarray | None = None
+    material_names: tuple[str, ...] = ()
+    faces: Faces | None = None
 
 
 @dataclass(frozen=True)

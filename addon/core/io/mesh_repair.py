@@ -22,7 +22,7 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     Returns
     -------
     mesh : RawMesh
-        Each triangle has an area; every vertex is finite.
+        Each triangle has an area; every vertex is finite. Materials and the file's faces are left out.
     warnings : list of str
 
     Raises
@@ -59,7 +59,8 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     if not PLAUSIBLE_EXTENT[0] <= extent <= PLAUSIBLE_EXTENT[1]:
         warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
     lit = None if mesh.lit is None else mesh.lit.part(good)
-    return replace(mesh, vertices=vertices, triangles=triangles, object_id=ids, uv=uv, lit=lit), warnings
+    kept = {"vertices": vertices, "triangles": triangles, "object_id": ids, "uv": uv, "lit": lit}
+    return replace(mesh, **kept, material=None, faces=None), warnings
 
 
 def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

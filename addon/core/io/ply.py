@@ -4,9 +4,12 @@ A body is bytes: those of the file where it is binary, those of all its numbers 
 kinds are read alike. Nothing is allocated before the counts that the header claims were compared with the file's size.
 """
 
+from __future__ import annotations
+
 import struct
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -59,6 +62,8 @@ class PlyMesh(NamedTuple):
         The file's face that each triangle is part of.
     corner : (t, 3) int32
         Which of that face's corners each of the triangle's is.
+    faces : int
+        Number of the file's faces.
     """
 
     vertices: np.ndarray
@@ -67,6 +72,7 @@ class PlyMesh(NamedTuple):
     uv: np.ndarray | None
     face: np.ndarray
     corner: np.ndarray
+    faces: int
 
 
 def read_ply(path: Path) -> PlyMesh:
@@ -80,17 +86,45 @@ def read_ply(path: Path) -> PlyMesh:
     BadInputError
         The file is absent, damaged, cut off, holds no mesh, or points to vertices that it doesn't hold.
     """
-    try:
+    with _one_sentence(path):
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
-        return _parse(read_bytes(path, "Mesh "))
+        return _mesh(_records(read_bytes(path, "Mesh ")))
+
+
+def read_columns(path: Path, groups: Sequence[tuple[str, ...]]) -> dict[str, np.ndarray | None]:
+    """The first of several `groups` of scalar properties that vertices and faces have.
+
+    Returns
+    -------
+    dict of str to (n, k) or None
+        Of 'vertex' and 'face': a group's properties side by side, None where they have none; without what is absent.
+
+    Raises
+    ------
+    BadInputError
+        The file can't be read, or is damaged.
+    """
+    with _one_sentence(path):
+        found = {}
+        for name, records in _records(read_bytes(path)).items():
+            columns = (records.columns(group) for group in groups)
+            found[name] = next((column for column in columns if column is not None), None)
+        return found
+
+
+@contextmanager
+def _one_sentence(path: Path) -> Iterator[None]:
+    try:
+        yield
     except ValueError as error:  # its text is the second half of a sentence
         raise BadInputError(f"Mesh '{path}' {error}; export it again.") from error
     except MemoryError as error:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
 
 
-def _parse(content: bytes) -> PlyMesh:
+def _records(content: bytes) -> dict[str, _Records]:
+    """The file's elements by their names, as far as the later of vertices and faces."""
     order, elements, at = parse_header(content)
     if order:
         data = np.frombuffer(content, np.uint8)
@@ -102,6 +136,10 @@ def _parse(content: bytes) -> PlyMesh:
         at = records.end
         if {"vertex", "face"} <= records_of.keys():
             break
+    return records_of
+
+
+def _mesh(records_of: dict[str, _Records]) -> PlyMesh:
     if "vertex" not in records_of:
         raise ValueError("holds no vertices")
     place, *pairs = (records_of["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
@@ -110,7 +148,7 @@ def _parse(content: bytes) -> PlyMesh:
     vertices = place.astype(np.float64)
     if "face" not in records_of:
         none = np.zeros((0, 3), np.int32)
-        return PlyMesh(vertices, none, None, None, np.zeros(0, np.int64), none)
+        return PlyMesh(vertices, none, None, None, np.zeros(0, np.int64), none, 0)
 
     faces = records_of["face"]
     name = next((n for n in INDEX_NAMES if n in faces.counts), None)
@@ -123,7 +161,7 @@ def _parse(content: bytes) -> PlyMesh:
         ids = whole[:, 0].astype(np.int64)[source]
     pair = next((pair for pair in pairs if pair is not None), None)
     uv = None if pair is None else pair.astype(np.float32)[triangles]
-    return PlyMesh(vertices, triangles, ids, uv, source, corner)
+    return PlyMesh(vertices, triangles, ids, uv, source, corner, len(faces.counts[name]))
 
 
 def parse_header(content: bytes) -> tuple[str, list[Element], int]:

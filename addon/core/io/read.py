@@ -21,6 +21,7 @@ from .conventions import parse, upright
 from .exposures import from_csv, from_exif
 from .files import absence, check_links
 from .folder import VIDEOS
+from .formats import SHAPE
 from .frame_codes import with_curves
 from .id_pictures import check_ids, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading, usable
@@ -30,6 +31,7 @@ from .picture import too_few_bytes
 from .pictures import picture_note, picture_size, read_picture
 from .pixels import read_pixels
 from .readers import reader_for
+from .segments import check_segments, laid_on
 
 MAX_BAD_SHARE: Limit[float] = 0.2
 """More bad frames than this share, and the capture is taken as broken instead of the frames as bad."""
@@ -51,8 +53,9 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     if not root.is_dir():
         what = "is a file, not a folder" if root.exists() else "does not exist"
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
+    check_segments(reading.segments)  # before a video is read through
     reader = reader_for(root, reading.format)
-    layout = reader.read(root, reading)
+    layout = laid_on(reader.read(root, reading), reading.segments, root)
     listed = root / instances.FILE
     if layout.names is None and listed.exists():
         layout = replace(layout, names=instances.read_instances(listed), names_file=instances.FILE)
@@ -64,8 +67,8 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
     frames, more = _usable(root, _exposed(layout, reading), reading.outside)
     frames, grouped = group_brackets(frames)
-    mesh, objects, warnings = _objects(layout, frames)
-    if layout.names is not None and Path(layout.names_file).name == instances.FILE:
+    mesh, objects, warnings = _objects(layout, frames, reading.segments == SHAPE)
+    if layout.names is not None and reading.segments != SHAPE and Path(layout.names_file).name == instances.FILE:
         objects, notes = instances.with_parts(objects, root / layout.names_file)
         warnings += notes
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
@@ -105,10 +108,11 @@ def _chosen(frames: list[Frame]) -> list[str]:
     return [f"Taken in {count} of {len(frames)} frames: {note}." for note, count in counts.items()]
 
 
-def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str]]:
+def _objects(layout: Layout, frames: list[Frame], by_shape: bool) -> tuple[Mesh, tuple, list[str]]:
     """The mesh repaired, with an instance for each of its triangles.
 
-    What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else its shape.
+    What tells the objects: segments, the mesh's faces, objects or groups; else pictures of ids; else its shape, which
+    the user may want (`by_shape`).
     """
     raw, warnings = repair(layout.mesh)
     count = len(raw.triangles)
@@ -121,9 +125,10 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     elif object_id is None:
         parts = parts_of(raw.vertices, raw.triangles)
         object_id, names = parts.part, parts.names
+        reason = "" if by_shape else "Nothing tells the mesh's objects: its faces have no object_id. "
         warnings.append(
-            "Nothing tells the mesh's objects: its faces have no object_id. By its shape it has "
-            f"{len(names)}; none of them is taken for metal or glass unless you say so."
+            f"{reason}By its shape the mesh has {len(names)} objects; none of them is taken for metal or glass unless "
+            "you say so."
         )
         if frames and parts.planes:
             added = close_holes(raw.vertices, raw.triangles, parts, frames, _pixels)

@@ -21,7 +21,8 @@ from . import nerfstudio, traj
 from .files import read_bytes, read_json
 from .formats import FORMATS
 from .instances import FILE, read_instances
-from .layout import Layout, RawMesh, Reader, Reading, holding
+from .layout import Layout, Reader, Reading, holding
+from .meshes import mesh_of
 from .ply import PlyMesh, read_ply
 from .replica_glass import FILE as GLASS
 from .replica_glass import mirrors_of, read_panes
@@ -48,7 +49,7 @@ def read(root: Path, reading: Reading) -> Layout:
     if reading.mesh is not None:
         raise BadInputError(f"Capture '{root}' has its light on its own mesh; leave --mesh away.")
     ply = read_ply(root / MESH)
-    mesh = RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=MESH)
+    mesh = mesh_of(ply, MESH)
     names, notes, names_file = None, [], NAMES
     if (root / SEMANTIC).is_file():
         ids, far = _object_id(root / SEMANTIC, ply)

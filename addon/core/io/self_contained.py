@@ -12,7 +12,7 @@ import re
 import shutil
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
@@ -32,27 +32,45 @@ DROPPED = ("textures", "images", "samplers", "animations", "skins", "cameras", "
 COMPRESSED = "KHR_draco_mesh_compression"
 OBJ_DROPPED = re.compile(rb"^\s*(mtllib|usemtl|usemap|maplib|call|csh)\b")
 OBJ_MATERIAL = re.compile(rb"^\s*usemtl\s+(.*\S)\s*$")
+OBJ_FACE = re.compile(rb"^\s*f\s")
 OBJ_PART = re.compile(rb"^([og] )(.*\S)\s*$")
 BLOCK: Block[int] = 1 << 20
 
 
-def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
-    """Copy the OBJ file `path` into `folder` without what its materials are, its objects or groups called 'part N'.
+class Copy(NamedTuple):
+    """A copy, and what the file says that it does not.
 
-    Returns
-    -------
-    copy : Path
-    named : bool
-        Whether it has objects (`o`); else its groups (`g`) are what tells its parts.
+    Attributes
+    ----------
+    path : Path
+        Of the copy.
     placed : list of Placed
-        What each is called: of a thousand of one name Blender takes long to name the next.
+        OBJ: what each part is called: of a thousand of one name Blender takes long to name the next. glTF: where the
+        file's nodes have the meshes.
+    materials : tuple of str
+        Their names, '' for none.
+    faces : int
+        How many it has; -1 where Blender would give them in another order.
+    named : bool
+        OBJ: whether it has objects (`o`); else its groups (`g`) are what tells its parts.
+    """
+
+    path: Path
+    placed: list[Placed]
+    materials: tuple[str, ...]
+    faces: int
+    named: bool = False
+
+
+def copy_obj(path: Path, folder: Path) -> Copy:
+    """Copy the OBJ file `path` into `folder` without what its materials are, its objects or groups called 'part N'.
 
     Raises
     ------
     OSError
         It can't be read, or the copy not written.
     """
-    copy, named, inside = folder / "mesh.obj", False, False
+    copy, named, inside, faces, in_order = folder / "mesh.obj", False, False, 0, True
     placed: list[Placed] = []
     materials: dict[bytes, int] = {}
     with open(path, "rb") as source, open(copy, "wb") as target:
@@ -63,22 +81,21 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
             named |= line.startswith(b"o ")
             if not dropped and (part := OBJ_PART.match(line)):
                 line = part[1] + f"part {len(placed)}\n".encode()
-                placed.append(Placed(len(placed), part[2].decode("utf-8", "replace").strip(), np.eye(4)))
+                placed.append(Placed(len(placed), part[2].decode("utf-8", "replace").strip(), np.eye(4), faces))
+            elif OBJ_FACE.match(line):
+                faces += 1
+                corners = [corner.split(b"/")[0] for corner in line.split()[1:]]
+                in_order &= len(set(corners)) == len(corners)  # else Blender puts what it makes of it last
             if material := OBJ_MATERIAL.match(line):
                 target.write(f"usemtl {MATERIAL}\n".format(materials.setdefault(material[1], len(materials))).encode())
             elif not dropped:
                 target.write(line)
-    return copy, named, placed
+    names = tuple(name.decode("utf-8", "replace") for name in materials)
+    return Copy(copy, placed, names, faces if in_order else -1, named)
 
 
-def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
+def copy_gltf(path: Path, folder: Path) -> Copy:
     """Copy the glTF or GLB file `path` into `folder`: its meshes, each in a node 'part N' of its own, buffers beside.
-
-    Returns
-    -------
-    copy : Path
-    placed : list of Placed
-        Where the file's nodes have the meshes.
 
     Raises
     ------
@@ -109,7 +126,8 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
     _check_sizes(top, sizes, path)
     for name in DROPPED:
         top.pop(name, None)
-    count = len(list_of(top, "materials", path))
+    materials = [material.get("name") for material in list_of(top, "materials", path)]
+    count = len(materials)
     top["materials"] = [{"name": MATERIAL.format(i)} for i in range(count)]
     for mesh in list_of(top, "meshes", path):
         for primitive in list_of(mesh, "primitives", path):
@@ -124,7 +142,10 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
             primitive["extensions"] = extensions
     meshes = list_of(top, "meshes", path)
     placed = placed_meshes(list_of(top, "nodes", path), len(meshes), path)
-    placed = [node._replace(name=node.name or str(meshes[node.mesh].get("name") or "")) for node in placed]
+    sizes, faces = [_triangles(mesh, top, path) for mesh in meshes], 0
+    for i, node in enumerate(placed):
+        placed[i] = node._replace(name=node.name or str(meshes[node.mesh].get("name") or ""), first=faces)
+        faces += sizes[node.mesh]
     used = sorted({node.mesh for node in placed})
     top["nodes"] = [{"mesh": number, "name": f"part {number}"} for number in used]
     top["scenes"], top["scene"] = [{"nodes": list(range(len(used)))}], 0
@@ -137,7 +158,18 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
             del top[name]
     copy = folder / "mesh.gltf"
     copy.write_text(json.dumps(top))
-    return copy, placed
+    return Copy(copy, placed, tuple(name if isinstance(name, str) else "" for name in materials), faces)
+
+
+def _triangles(mesh: dict[str, Any], top: dict[str, Any], path: Path) -> int:
+    """How many triangles a mesh says that it has."""
+    accessors, count = list_of(top, "accessors", path), 0
+    for primitive in list_of(mesh, "primitives", path):
+        attributes, mode = primitive.get("attributes"), primitive.get("mode", 4)
+        place: Any = primitive.get("indices", attributes.get("POSITION") if isinstance(attributes, dict) else None)
+        corners = int(accessors[place]["count"]) if is_index(place, len(accessors)) else 0
+        count += corners // 3 if mode == 4 else max(corners - 2, 0) if mode in (5, 6) else 0
+    return count
 
 
 def read_gltf(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:

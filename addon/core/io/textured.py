@@ -65,7 +65,7 @@ def read(root: Path, reading: Reading) -> Layout:
         "The capture has no cameras: the light is taken from the texture of its mesh. That is weaker than frames: "
         "highlights can't be told, nor what the texture clips, nor what lies outside."
     )
-    return Layout([], replace(mesh, lit=lit, material=None), notes=[note])
+    return Layout([], replace(mesh, lit=lit), notes=[note])
 
 
 READER = Reader("textured", FORMATS["textured"], find, read)

@@ -13,12 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from ..kinds import Block
 from ..significance import LEVELS
 from .model import Frame, Mesh, Pixels
 from .params import CLOSING, PARTS
 from .rays import RayScene
 from .shape_parts import Parts, Plane, plane_gap
 from .sight import RadianceBeyond, Sight, between_frames, colours, sight_of
+
+AT_ONCE: Block[int] = 1 << 18
+"""Points on triangles."""
 
 
 @dataclass(frozen=True)
@@ -320,13 +324,15 @@ def _covered(grid: PlaneGrid, corners: np.ndarray) -> np.ndarray:
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1, initial=0)
     steps = np.exp2(np.ceil(np.log2(np.maximum(2 * fine * longest / grid.edge, 1)))).astype(int)
     for count in np.unique(steps):
-        points = corners[steps == count]
-        for i in range(count + 1):
-            for j in range(count + 1 - i):
-                point = points[:, 0] + (i * (points[:, 1] - points[:, 0]) + j * (points[:, 2] - points[:, 0])) / count
-                offset = (point - grid.corner) * (fine / grid.edge)
-                row, column = (np.floor(offset @ axis).astype(int) for axis in (grid.up, grid.right))
-                inside = (row >= 0) & (column >= 0) & (row < covered.shape[0]) & (column < covered.shape[1])
-                covered[row[inside], column[inside]] = True
+        first, second, third = corners[steps == count].swapaxes(0, 1)
+        pairs = np.argwhere(np.add.outer(np.arange(count + 1), np.arange(count + 1)) <= count)
+        size = max(AT_ONCE // len(first), 1)
+        for at in range(0, len(pairs), size):
+            i, j = pairs[at : at + size, :, None, None].swapaxes(0, 1)
+            point = (first + (i * (second - first) + j * (third - first)) / count).reshape(-1, 3)
+            offset = (point - grid.corner) * (fine / grid.edge)
+            row, column = (np.floor(offset @ axis).astype(int) for axis in (grid.up, grid.right))
+            inside = (row >= 0) & (column >= 0) & (row < covered.shape[0]) & (column < covered.shape[1])
+            covered[row[inside], column[inside]] = True
     height, width = grid.open.shape
     return covered.reshape(height, fine, width, fine).all((1, 3))

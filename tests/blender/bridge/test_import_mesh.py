@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import json
+
 import bpy
 import numpy as np
 import pytest
@@ -123,3 +126,70 @@ def test_a_mesh_that_is_being_edited_stays_so(scene, tmp_path, kind):
     assert mine.mode == "EDIT" and mine.select_get()
     assert bpy.context.view_layer.objects.active == mine and len(scene.collection.all_objects) == 1
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def centres(mesh):
+    return mesh.vertices[mesh.triangles].mean(1)
+
+
+@pytest.mark.parametrize("letter", ["o", "g"])
+def test_triangles_of_an_obj_know_their_face_in_the_file(tmp_path, letter):
+    """Parts in no alphabetical order, one of them none's; quads, a pentagon and triangles, at x = their number."""
+    shapes, lines = [3, 4, 5, 3, 4, 3], ["v 0 0 9"]
+    for i, count in enumerate(shapes):
+        lines += [f"{letter} {'zebra' if i < 3 else 'ant'}{i}"] * (i in (1, 3, 5))
+        angles = np.arange(count) * 2 * np.pi / count
+        lines += [f"v {i} {np.cos(a):.6f} {np.sin(a):.6f}" for a in angles]
+        lines.append("f " + " ".join(str(k - count) for k in range(count)))
+    path = tmp_path / "a.obj"
+    path.write_text("\n".join(lines) + "\n")
+    mesh = import_mesh(path)
+    assert mesh.faces.total == 6 and not mesh.faces.own_vertices
+    assert mesh.faces.of_triangle.tolist() == np.rint(centres(mesh)[:, 0]).tolist()
+    assert len(mesh.triangles) == sum(shapes) - 12
+
+
+@pytest.mark.parametrize("odd", ["f 1 2 2 3", "f 1 2", "f 1 1 1"])
+def test_an_obj_whose_faces_blender_changes_has_no_order(tmp_path, odd):
+    path = tmp_path / "a.obj"
+    path.write_text(f"{QUAD}f 1 2 3\n{odd}\nf 1 2 3 4\nf 2 3 4\n")
+    assert import_mesh(path).faces.total == -1
+
+
+def test_names_of_materials_are_kept(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(f"mtllib no.mtl\n{QUAD}usemtl dark oak\nf 1 2 3\nusemtl steel\nf 2 3 4\nusemtl dark oak\nf 1 3 4\n")
+    mesh = import_mesh(path)
+    assert mesh.material_names == ("dark oak", "steel") and mesh.material.tolist() == [0, 1, 0]
+
+
+def test_triangles_of_a_gltf_are_counted_node_by_node(tmp_path):
+    """Two nodes of one mesh around another, whose names come in another order; two primitives, one a fan."""
+    corners = np.array([(x, y, 0) for x in range(3) for y in range(2)], np.float32)
+    index = np.array([0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5, 0, 1, 3, 2], np.uint16)
+    data = corners.tobytes() + index.tobytes()
+    count = {"bufferView": 1, "componentType": 5123, "type": "SCALAR"}
+    top = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"mesh": 0, "name": "zebra"}, {"mesh": 1, "name": "ant", "translation": [0, 0, 5]},
+                  {"mesh": 0, "name": "bee", "translation": [0, 0, 9]}],
+        "materials": [{"name": "wood"}, {}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 1},
+                                   {"attributes": {"POSITION": 0}, "indices": 2, "material": 0}]},
+                   {"primitives": [{"attributes": {"POSITION": 0}, "indices": 3, "mode": 6}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 6, "type": "VEC3",
+                       "min": [0, 0, 0], "max": [2, 1, 0]},
+                      count | {"count": 9}, count | {"count": 3, "byteOffset": 18},
+                      count | {"count": 4, "byteOffset": 24}],
+        "bufferViews": [{"buffer": 0, "byteLength": corners.nbytes},
+                        {"buffer": 0, "byteOffset": corners.nbytes, "byteLength": index.nbytes}],
+        "buffers": [{"uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode(),
+                     "byteLength": len(data)}],
+    }  # fmt: skip
+    path = tmp_path / "a.gltf"
+    path.write_text(json.dumps(top))
+    mesh = import_mesh(path)
+    own = {mesh.names[i]: mesh.faces.of_triangle[mesh.object_id == i].tolist() for i in mesh.names}
+    assert own == {"ant": [4, 5], "bee": [6, 7, 8, 9], "zebra": [0, 1, 2, 3]} and mesh.faces.total == 10
+    assert mesh.material_names == ("wood", "")
+    assert mesh.material[mesh.object_id == 2].tolist() == [1, 1, 1, 0]

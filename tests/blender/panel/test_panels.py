@@ -6,6 +6,7 @@ import json
 import shutil
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -272,6 +273,7 @@ def test_reading_options_match_the_command_line(choices, module):
     assert reading_props.options(owner) == []
     owner.reading_format, owner.reading_outside, owner.reading_transfer = "nerfstudio", True, "srgb"
     owner.reading_mesh, owner.reading_exposures, owner.reading_convention = "/m.ply", "/e.csv", "y-up"
+    owner.reading_segments, owner.reading_segments_file = "FILE", "/s.txt"
     given = make_parser().parse_args(["info", "/capture", *reading_props.options(owner)])
     here = reading_props.reading(owner)
     assert (given.format, given.mesh, given.outside, given.transfer, given.exposures, given.convention) == (
@@ -282,3 +284,7 @@ def test_reading_options_match_the_command_line(choices, module):
         here.exposures,
         here.convention,
     )
+    assert given.segments == here.segments == Path("/s.txt")
+    owner.reading_segments = "materials"
+    assert reading_props.options(owner)[-3:-1] == ["--segments", reading_props.reading(owner).segments]
+    assert "reading_segments_file" not in reading_props.visible_names(owner)

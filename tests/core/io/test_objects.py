@@ -62,7 +62,7 @@ def test_a_capture_of_loose_parts_gets_an_object_for_each(capture, text_of_ply):
     read = read_capture(capture.root)
     assert [one.class_name for one in read.instances] == ["part_0", "part_1"]
     assert all(one.guess for one in read.instances)
-    assert any("By its shape it has 2" in warning for warning in read.warnings)
+    assert any("By its shape the mesh has 2" in warning for warning in read.warnings)
 
 
 @pytest.fixture(scope="module")

@@ -24,9 +24,10 @@ def gltf(**changes):
 def test_an_obj_loses_its_libraries(tmp_path):
     (tmp_path / "a.obj").write_text("mtllib ../one.mtl \\\n ../two.mtl\no chair\nv 0 0 0\n  usemtl wood\ncall x.obj\n")
     (tmp_path / "copy").mkdir()
-    copy, named, placed = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
+    copy = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
     text = "o part 0\nv 0 0 0\nusemtl material 0\n"
-    assert named and copy.read_text() == text and [one.name for one in placed] == ["chair"]
+    assert copy.named and copy.path.read_text() == text and [one.name for one in copy.placed] == ["chair"]
+    assert copy.materials == ("wood",)
 
 
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path):

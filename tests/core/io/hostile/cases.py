@@ -75,6 +75,13 @@ def with_table(root: Path) -> None:
     (root / "exposures.csv").write_text("\n".join(["name,shutter,aperture,iso", *lines]) + "\n")
 
 
+def with_segments(root: Path) -> None:
+    nerfstudio(root)
+    (root / "ids.txt").write_text("# of each face\n" + "\n".join(map(str, range(len(SIDES)))) + "\n")
+    np.save(root / "ids.npy", np.arange(len(SIDES), dtype=np.int32))
+    (root / "ids.ply").write_text((root / "mesh.ply").read_text())
+
+
 def with_binary_ply(root: Path) -> None:
     nerfstudio(root)
     head = (
@@ -304,6 +311,10 @@ CASES = (
     Case("binary_ply", with_binary_ply, "mesh.ply"),
     Case("mask", nerfstudio, "mask.png"),
     Case("exposures", with_table, "exposures.csv"),
+    *(
+        Case(f"segments_{one}", with_segments, f"ids.{one}", Reading(segments=f"ids.{one}"))
+        for one in ("txt", "npy", "ply")
+    ),
     Case("hdr", with_pictures(".hdr", hdr_content()), "images/000.hdr"),
     Case("png", with_pictures(".png", png_content()), "images/000.png", CODED),
     Case("jpeg", with_pictures(".jpg", JPEG), "images/000.jpg", CODED),
@@ -331,11 +342,15 @@ CASES = (
 )
 
 
+def placed(reading: Reading, root: Path) -> Reading:
+    """The same of a capture in `root`."""
+    paths = {name: root / value for name in ("mesh", "segments") if (value := getattr(reading, name))}
+    return replace(reading, **paths)
+
+
 def fresh(case: Case, root: Path) -> tuple[Path, Reading]:
     """The capture written anew; gives the victim's path and how to read the capture."""
     shutil.rmtree(root, ignore_errors=True)
     case.make(root)
     reading = Reading(exposures=root / case.victim) if case.name == "exposures" else case.reading
-    if reading.mesh is not None:
-        reading = replace(reading, mesh=root / reading.mesh)
-    return root / case.victim, reading
+    return root / case.victim, placed(reading, root)
