@@ -3,9 +3,10 @@
 
     python scripts/coarse_objects.py CAPTURE OUT [--within 0.02]
 
-A cupboard gets its handles, a table its cloth, a wall its panels. Each object becomes part of the larger one
-that most of its surface is near to. What bounds the room takes nothing in, and lamps stay by themselves (`truth/` tells
-them). Frames and truth are those of CAPTURE, which is in nerfstudio's layout; they are copied.
+A cupboard gets its handles, a table its cloth, a wall its panels. Each object becomes part of the larger one that most
+of its surface is near to. What is larger than all camera positions along two axes bounds the room: it takes nothing in.
+Lamps stay by themselves (`truth/` tells them). Frames and truth are those of CAPTURE, which is in nerfstudio's layout;
+they are copied.
 """
 
 import argparse
@@ -25,8 +26,6 @@ DENSITY, FEWEST, MOST = 4000, 300, 60_000
 """Points on each object: per square metre, at least, at most."""
 TOUCHING = 3
 """More points than these have to be near."""
-BOUNDING = 0.7
-"""What is as large as this share of the room along two axes bounds it."""
 
 
 def points_on(corners: np.ndarray, area: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -38,15 +37,21 @@ def points_on(corners: np.ndarray, area: np.ndarray, rng: np.random.Generator) -
     return a + u * (b - a) + v * (c - a)
 
 
-def coarse(vertices: np.ndarray, triangles: np.ndarray, object_id: np.ndarray, fixed: set[int], within: float) -> dict:
+def coarse(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    object_id: np.ndarray,
+    cameras: np.ndarray,
+    fixed: set[int],
+    within: float,
+) -> dict:
     """What each object becomes part of, by their numbers."""
     corners = vertices[triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     rng, ids = np.random.default_rng(0), np.unique(object_id).tolist()
     size = {i: area[object_id == i].sum() for i in ids}
     points = {i: points_on(corners[object_id == i], area[object_id == i], rng) for i in ids}
-    extent = np.ptp(corners.reshape(-1, 3), axis=0)
-    fixed = fixed | {i for i in ids if (np.ptp(points[i], axis=0) > BOUNDING * extent).sum() >= 2}
+    fixed = fixed | {i for i in ids if (np.ptp(points[i], axis=0) > np.ptp(cameras, axis=0)).sum() >= 2}
     host = {i: i for i in ids}
     for i in sorted(set(ids) - fixed, key=lambda i: size[i]):
         nearest = TOUCHING
@@ -72,7 +77,9 @@ def main() -> int:
     mesh = read_ply(options.out / "mesh.ply")
     objects = json.loads((options.out / "truth" / "materials.json").read_text())
     lamps = {entry["id"] for entry in objects if entry["emission"]}
-    host = coarse(mesh.vertices, mesh.triangles, mesh.object_id, lamps, options.within)
+    frames = json.loads((options.out / "transforms.json").read_text())["frames"]
+    cameras = np.array([frame["transform_matrix"] for frame in frames])[:, :3, 3]
+    host = coarse(mesh.vertices, mesh.triangles, mesh.object_id, cameras, lamps, options.within)
     ids = np.array([host[int(i)] for i in mesh.object_id], np.int32)
     (options.out / "mesh.ply").write_bytes(ply_bytes(mesh.vertices, [(mesh.triangles, ids)]))
     named = json.loads((options.out / "info_semantic.json").read_text())

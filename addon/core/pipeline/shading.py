@@ -18,7 +18,7 @@ from ..light.sun import Sun, extract_sun
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.patches import clipped_patches
-from ..passes.material_parts.material_parts import connected_pieces, unlike_pieces
+from ..passes.material_parts.material_parts import seen_pieces, unlike_pieces
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..progress import Progress
@@ -83,7 +83,7 @@ def find_shading(
         panes = mirror_patches(field, observed.samples)
         patches, surface = Patches.together([patches, panes]), panes.surface(surface)
     if not parts_guessed and "material-parts" not in s.without:
-        patches = connected_pieces(surface.mesh, surface.atlas, lit_diffuse.seen)
+        patches = seen_pieces(surface.mesh, surface.atlas, lit_diffuse.seen)
         surface = patches.surface(surface)
     capture = patches.capture(capture)
 

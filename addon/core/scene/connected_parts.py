@@ -21,9 +21,7 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     triangles : (t, 3) int
         At least one; vertices used are finite.
     """
-    used, corners = np.unique(triangles.ravel(), return_inverse=True)
-    faces = weld(vertices[used])[corners.ravel()].reshape(-1, 3)
-    part = connected(faces)
+    part = connected_pieces(vertices, triangles)
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = np.bincount(part, area)
@@ -32,6 +30,12 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     number = np.full(len(surface), -1)
     number[largest] = np.arange(len(largest))
     return to_nearest(number[part], (a + b + c) / 3)
+
+
+def connected_pieces(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The piece of each of some triangles ((t, 3) int), (t,) int64 from 0: those that share a vertex are of one."""
+    used, corners = np.unique(triangles.ravel(), return_inverse=True)
+    return connected(weld(vertices[used])[corners.ravel()].reshape(-1, 3))
 
 
 def to_nearest(part: np.ndarray, centre: np.ndarray) -> np.ndarray:

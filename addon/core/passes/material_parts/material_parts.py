@@ -16,28 +16,28 @@ from scipy.stats import ks_2samp
 
 from ...groups import by_number
 from ...scene.atlas import Atlas
-from ...scene.connected_parts import connected_parts
+from ...scene.connected_parts import connected_pieces
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Mesh
 from ...scene.patches import Patches
 from ...significance import LEVELS
 
 
-def connected_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
-    """Each object's connected pieces that enough `seen` elements ((n,) bool) show, but for the greatest of them."""
+def seen_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
+    """Connected pieces of objects that enough `seen` elements ((n,) bool) show, but for the most seen of each."""
     count = np.bincount(atlas.triangle[seen], minlength=len(mesh.triangles))
     next_id, pieces = int(mesh.object_id.max()) + 1, [Patches.none()]
     for triangles in by_number(mesh.object_id).values():
         if count[triangles].sum() < LEVELS.few:
             continue
-        piece = connected_parts(mesh.vertices, mesh.triangles[triangles])
+        piece = connected_pieces(mesh.vertices, mesh.triangles[triangles])
         seen_count = np.bincount(piece, count[triangles])
-        seen_count[np.argmax(seen_count)] = 0
-        for number in np.flatnonzero(seen_count >= LEVELS.few):
-            triangle = triangles[piece == number].astype(np.int32)
-            ids = np.full(len(triangle), next_id, np.int32)
-            pieces.append(Patches(triangle, ids, parts=np.array([next_id], np.int32)))
-            next_id += 1
+        for number in np.argsort(-seen_count, kind="stable")[1 : LEVELS.most]:
+            if seen_count[number] >= LEVELS.few:
+                triangle = triangles[piece == number].astype(np.int32)
+                ids = np.full(len(triangle), next_id, np.int32)
+                pieces.append(Patches(triangle, ids, parts=np.array([next_id], np.int32)))
+                next_id += 1
     return Patches.together(pieces)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.passes.material_parts.material_parts import connected_pieces, unlike_pieces
+from addon.core.passes.material_parts.material_parts import seen_pieces, unlike_pieces
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Capture, Instance
 from addon.core.scene.patches import Patches
@@ -40,7 +40,7 @@ def lit(room, albedo, noise=0.02, seen=None):
 def groups(room, albedo, noise=0.02, seen=None, sources=()):
     """The left edges in metres of the panels in each group that stays apart."""
     lit_diffuse = lit(room, albedo, noise, seen)
-    pieces = connected_pieces(room.mesh, room.atlas, lit_diffuse.seen)
+    pieces = seen_pieces(room.mesh, room.atlas, lit_diffuse.seen)
     apart = pieces.surface(room.surface)
     irradiance = np.full((len(room.atlas), 3), 2, np.float32)
     found = unlike_pieces(pieces, room.atlas.object_id, apart.atlas, lit_diffuse, irradiance, sources)
@@ -71,7 +71,7 @@ def test_texture_is_no_other_material(room):
 def test_a_lamp_stays_by_itself(room):
     """Here the second panel shines, and the others are alike but for the fourth, which is alike to the lamp."""
     lit_diffuse = lit(room, (0.6, 0.2, 0.6, 0.2, 0.5))
-    lamp = connected_pieces(room.mesh, room.atlas, lit_diffuse.seen).objects[0]
+    lamp = seen_pieces(room.mesh, room.atlas, lit_diffuse.seen).objects[0]
     assert groups(room, (0.6, 0.2, 0.6, 0.2, 0.5), sources={lamp}) == [[2.0], [6.0]]
 
 
@@ -82,7 +82,7 @@ def test_what_no_frame_saw_stays_with_the_rest(room):
 
 
 def test_parts_become_instances_of_what_they_are_part_of(room, tmp_path):
-    pieces = connected_pieces(room.mesh, room.atlas, np.ones(len(room.atlas), bool))
+    pieces = seen_pieces(room.mesh, room.atlas, np.ones(len(room.atlas), bool))
     first, second, third = pieces.objects
     chosen, number = pieces.grouped([[first, third], [second]])
     assert number == {first: 6, third: 6, second: 7}
