@@ -325,14 +325,14 @@ def _covered(grid: PlaneGrid, corners: np.ndarray) -> np.ndarray:
     steps = np.exp2(np.ceil(np.log2(np.maximum(2 * fine * longest / grid.edge, 1)))).astype(int)
     for count in np.unique(steps):
         first, second, third = corners[steps == count].swapaxes(0, 1)
-        pairs = np.argwhere(np.add.outer(np.arange(count + 1), np.arange(count + 1)) <= count)
         size = max(AT_ONCE // len(first), 1)
-        for at in range(0, len(pairs), size):
-            i, j = pairs[at : at + size, :, None, None].swapaxes(0, 1)
-            point = (first + (i * (second - first) + j * (third - first)) / count).reshape(-1, 3)
-            offset = (point - grid.corner) * (fine / grid.edge)
-            row, column = (np.floor(offset @ axis).astype(int) for axis in (grid.up, grid.right))
-            inside = (row >= 0) & (column >= 0) & (row < covered.shape[0]) & (column < covered.shape[1])
-            covered[row[inside], column[inside]] = True
+        for i in range(count + 1):
+            for at in range(0, count + 1 - i, size):
+                j = np.arange(at, min(at + size, count + 1 - i))[:, None, None]
+                point = (first + (i * (second - first) + j * (third - first)) / count).reshape(-1, 3)
+                offset = (point - grid.corner) * (fine / grid.edge)
+                row, column = (np.floor(offset @ axis).astype(int) for axis in (grid.up, grid.right))
+                inside = (row >= 0) & (column >= 0) & (row < covered.shape[0]) & (column < covered.shape[1])
+                covered[row[inside], column[inside]] = True
     height, width = grid.open.shape
     return covered.reshape(height, fine, width, fine).all((1, 3))
