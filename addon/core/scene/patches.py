@@ -64,15 +64,17 @@ class Patches:
 
     def grouped(self, groups: Iterable[Sequence[int]]) -> tuple[Patches, dict[int, int]]:
         """Some of the objects alone, each group as one, numbered without gaps; and the new number of each."""
-        group_of = {old: group for group, members in enumerate(groups) for old in members}
-        numbers = {old: min(self.objects, default=0) + group for old, group in group_of.items()}
-        chosen = np.isin(self.object_id, list(numbers))
+        first = min(self.objects, default=0)
+        numbers = {old: first + group for group, members in enumerate(groups) for old in members}
+        old = np.array(sorted(numbers), np.int32)
+        new = np.array([numbers[int(i)] for i in old], np.int32)
 
         def renumbered(ids: np.ndarray) -> np.ndarray:
-            return np.array([numbers[int(i)] for i in ids if int(i) in numbers], np.int32)
+            return new[np.searchsorted(old, ids[np.isin(ids, old)])]
 
-        mirrors, parts = np.unique(renumbered(self.mirrors)), np.unique(renumbered(self.parts))
-        return Patches(self.triangle[chosen], renumbered(self.object_id[chosen]), mirrors, parts), numbers
+        mirrors, parts = (np.unique(renumbered(ids)) for ids in (self.mirrors, self.parts))
+        triangle = self.triangle[np.isin(self.object_id, old)]
+        return Patches(triangle, renumbered(self.object_id), mirrors, parts), numbers
 
     def mesh(self, mesh: Mesh) -> Mesh:
         """A mesh with them set apart; it may lack the second sides (`Mesh.backs`)."""

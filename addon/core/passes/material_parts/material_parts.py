@@ -5,8 +5,7 @@ apart while the light is found, so that each may be a lamp or a mirror. Afterwar
 together again: whose distributions of log(pi L_d / E) overlap by half. What remains apart has a model, lobe and prior
 of its own.
 
-Measured on the living room and a kitchen whose objects were put together by what touches (64 objects to 20, 283 to 34;
-`docs/benchmark/material_parts.md`).
+What it gains in rooms whose objects were put together by what touches: `docs/benchmark/material_parts.md`.
 """
 
 from collections.abc import Collection
@@ -65,21 +64,23 @@ def unlike_pieces(
     groups = [[piece] for piece in pieces.objects if piece in sources]
 
     def log_albedo(i: int) -> np.ndarray:
-        return np.log(np.pi * lit_diffuse.radiance[elements[i]] / irradiance[elements[i]])
+        sample = elements[i][:: -(-len(elements[i]) // LEVELS.sample)]
+        return np.log(np.pi * lit_diffuse.radiance[sample] / irradiance[sample])
 
     for parent, members in by_number(np.where(is_piece, whole, -1)).items():
         if parent < 0:
             continue
         ids = [parent, *np.unique(atlas.object_id[members]).tolist()]
         ids = [i for i in ids if i not in sources and len(elements.get(i, ())) >= LEVELS.few]
-        found: list[list[int]] = []
+        found: list[tuple[np.ndarray, list[int]]] = []
         for i in sorted(ids, key=lambda i: (i != parent, -len(elements[i]))):
-            group = next((group for group in found if _alike(log_albedo(group[0]), log_albedo(i))), None)
+            look = log_albedo(i)
+            group = next((group for first, group in found if _alike(first, look)), None)
             if group is None:
-                found.append([i])
+                found.append((look, [i]))
             else:
                 group.append(i)
-        groups += [group for group in found if parent not in group]
+        groups += [group for _, group in found if parent not in group]
     return groups
 
 
