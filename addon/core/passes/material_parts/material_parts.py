@@ -11,6 +11,7 @@ What it gains in rooms whose objects were put together by what touches: `docs/be
 from collections.abc import Collection
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.stats import ks_2samp
 
 from ...groups import by_number
@@ -32,7 +33,7 @@ def seen_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
         piece = connected_pieces(mesh.vertices, mesh.triangles[triangles])
         seen_count = np.bincount(piece, count[triangles])
         for number in np.argsort(-seen_count, kind="stable")[1 : LEVELS.most]:
-            if seen_count[number] >= LEVELS.few:
+            if seen_count[number] >= LEVELS.enough:
                 triangle = triangles[piece == number].astype(np.int32)
                 ids = np.full(len(triangle), next_id, np.int32)
                 pieces.append(Patches(triangle, ids, parts=np.array([next_id], np.int32)))
@@ -72,6 +73,7 @@ def unlike_pieces(
             continue
         ids = [parent, *np.unique(atlas.object_id[members]).tolist()]
         ids = [i for i in ids if i not in sources and len(elements.get(i, ())) >= LEVELS.few]
+        ids = [i for i in ids if i == parent or not _is_other_side(elements[i], elements.get(parent), atlas)]
         found: list[tuple[np.ndarray, list[int]]] = []
         for i in sorted(ids, key=lambda i: (i != parent, -len(elements[i]))):
             look = log_albedo(i)
@@ -82,6 +84,21 @@ def unlike_pieces(
                 group.append(i)
         groups += [group for _, group in found if parent not in group]
     return groups
+
+
+def _is_other_side(piece: np.ndarray, rest: np.ndarray | None, atlas: Atlas) -> bool:
+    """Whether most elements of a piece face away from some of the rest right behind them, as a pane's two sheets do.
+
+    What is behind a pane shows on either sheet, and they look unlike for that.
+    """
+    if rest is None:
+        return False
+    nearest = cKDTree(atlas.position[rest]).query(
+        atlas.position[piece], distance_upper_bound=LEVELS.likely * atlas.texel_edge
+    )[1]
+    near = np.flatnonzero(nearest < len(rest))
+    facing = np.einsum("ij,ij->i", atlas.normal[piece[near]], atlas.normal[rest[nearest[near]]])
+    return 2 * int((facing < 0).sum()) > len(piece)
 
 
 def _alike(a: np.ndarray, b: np.ndarray) -> bool:

@@ -81,6 +81,19 @@ def test_what_no_frame_saw_stays_with_the_rest(room):
     assert groups(room, (0.6, 0.2, 0.6, 0.2, 0.5), seen=np.zeros(len(seen), bool)) == []
 
 
+def test_the_two_sheets_of_a_pane_are_one_thing():
+    """What is behind it shows on either, so that they look unlike."""
+    for apart, expected in ((0.1, 0), (0.5, 1)):
+        sheets = [panel(0), quad((0, 0, -apart), (0, 1, 0), (1, 0, 0), WHOLE)]
+        room = make_room(sheets)
+        lit_diffuse = lit(room, (0.6,))
+        lit_diffuse.radiance[room.atlas.position[:, 2] < 0] /= 3
+        pieces = seen_pieces(room.mesh, room.atlas, lit_diffuse.seen)
+        irradiance = np.full((len(room.atlas), 3), 2, np.float32)
+        atlas = pieces.surface(room.surface).atlas
+        assert len(unlike_pieces(pieces, room.atlas.object_id, atlas, lit_diffuse, irradiance, ())) == expected
+
+
 def test_parts_become_instances_of_what_they_are_part_of(room, tmp_path):
     pieces = seen_pieces(room.mesh, room.atlas, np.ones(len(room.atlas), bool))
     first, second, third = pieces.objects
