@@ -99,10 +99,7 @@ def find_shading(
     else:
         shading = shade_clipped(shaded, lit_diffuse, surface.atlas, patches.lamps)
     sources = shading.emitters | {mirror.object_id for mirror in shading.mirrors}
-    if len(patches.parts):
-        groups = unlike_pieces(patches, whole, surface.atlas, lit_diffuse, shading.irradiance, sources)
-    else:
-        groups = [[i] for i in patches.objects if i in sources]
+    groups = unlike_pieces(patches, whole, surface.atlas, lit_diffuse, shading.irradiance, sources)
     return with_patches_of(shading, patches, groups)
 
 

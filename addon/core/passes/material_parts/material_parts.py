@@ -59,21 +59,25 @@ def unlike_pieces(
     sources : collection of int
         Lamps and mirrors, which stay by themselves.
     """
+    groups = [[piece] for piece in pieces.objects if piece in sources]
+    if not len(pieces.parts):
+        return groups
     usable = lit_diffuse.seen & (irradiance.min(1) > 0) & (lit_diffuse.radiance.min(1) > 0)
     elements = by_number(np.where(usable, atlas.object_id, -1))
-    is_piece = np.isin(atlas.object_id, pieces.parts)
-    groups = [[piece] for piece in pieces.objects if piece in sources]
+
+    def may_be_alike(i: int) -> bool:
+        return i not in sources and len(elements.get(i, ())) >= LEVELS.few
 
     def log_albedo(i: int) -> np.ndarray:
         sample = elements[i][:: -(-len(elements[i]) // LEVELS.sample)]
         return np.log(np.pi * lit_diffuse.radiance[sample] / irradiance[sample])
 
-    for parent, members in by_number(np.where(is_piece, whole, -1)).items():
-        if parent < 0:
-            continue
-        ids = [parent, *np.unique(atlas.object_id[members]).tolist()]
-        ids = [i for i in ids if i not in sources and len(elements.get(i, ())) >= LEVELS.few]
-        ids = [i for i in ids if i == parent or not _is_other_side(elements[i], elements.get(parent), atlas)]
+    siblings: dict[int, list[int]] = {}
+    for i in filter(may_be_alike, pieces.parts.tolist()):
+        siblings.setdefault(int(whole[elements[i][0]]), []).append(i)
+    for parent, others in siblings.items():
+        ids = [i for i in others if not _is_other_side(elements[i], elements.get(parent), atlas)]
+        ids += [parent] if may_be_alike(parent) else []
         found: list[tuple[np.ndarray, list[int]]] = []
         for i in sorted(ids, key=lambda i: (i != parent, -len(elements[i]))):
             look = log_albedo(i)
