@@ -8,7 +8,7 @@ import numpy as np
 import OpenEXR
 from mathutils import Matrix
 
-from addon.bridge.data.materials import BASE_COLOR, METALLIC, principled
+from addon.bridge.data.materials import BASE_COLOR, EMISSION_STRENGTH, METALLIC, principled
 from addon.bridge.data.nodes import add_node, feed, find_node, fresh_tree
 from addon.bridge.demo import render as demo_render
 from addon.bridge.demo.room import FIELD_OF_VIEW, frame_path, look_at, write_all_but_frames
@@ -21,6 +21,9 @@ from .furnish import FurnishedRoom
 RELIT = ("A", (0.25, 60.0, 45.0, 30.0))
 """Name of the one new light; half its edge and its radiance."""
 
+
+STRENGTHS = {"EMISSION": "Strength", "BSDF_PRINCIPLED": EMISSION_STRENGTH}
+"""What tells how strongly a node emits, by the node's type."""
 
 TOO_NEW = (5, 0)
 """Blender from which on the Python module writes the combined pass alone to a multilayer file (observed in 5.2)."""
@@ -112,10 +115,11 @@ def build(room: FurnishedRoom, scene) -> None:
         _link(scene, light, look_at((0, 0, 0), towards))
 
 
-def _link(scene, data, pose) -> None:
+def _link(scene, data, pose) -> bpy.types.Object:
     obj = bpy.data.objects.new(data.name, data)
     obj.matrix_world = Matrix(np.asarray(pose).tolist())
     scene.collection.objects.link(obj)
+    return obj
 
 
 def _clear(material) -> None:
@@ -157,26 +161,29 @@ def _override(scene) -> None:
         feed(find_node(material, "OUTPUT_MATERIAL").inputs["Surface"], light.outputs[0])
 
 
-def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
-    """Turn all lights off but one new one, which emits on one side."""
+def relight(scene, pose: np.ndarray, radiance: tuple[float, float, float]) -> bpy.types.Object:
+    """Turn all lights off but one new one, the square [-1, 1]^2 of `pose`, which emits along its +z; returns it."""
     scene.world = None
-    for obj in list(scene.collection.objects):
+    for obj in list(scene.collection.all_objects):
         if obj.type == "LIGHT":
             bpy.data.objects.remove(obj)
     for material in bpy.data.materials:
-        for node in material.node_tree.nodes:
-            if node.type == "EMISSION":
-                node.inputs["Strength"].default_value = 0
+        for node in material.node_tree.nodes if material.node_tree else ():
+            strength = STRENGTHS.get(node.type)
+            if strength:
+                for link in list(node.inputs[strength].links):
+                    material.node_tree.links.remove(link)
+                node.inputs[strength].default_value = 0
     mesh = bpy.data.meshes.new("light")
     mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("light")
-    tree, top = fresh_tree(material), max(RELIT[1][1:])
+    tree, top = fresh_tree(material), max(radiance)
     side = add_node(tree, "ShaderNodeNewGeometry")
     front = add_node(tree, "ShaderNodeMath", side.outputs["Backfacing"], -top, top, operation="MULTIPLY_ADD")
-    shine = add_node(tree, "ShaderNodeEmission", (*(c / top for c in RELIT[1][1:]), 1), front.outputs[0])
+    shine = add_node(tree, "ShaderNodeEmission", (*(c / top for c in radiance), 1), front.outputs[0])
     add_node(tree, "ShaderNodeOutputMaterial", shine.outputs[0])
     mesh.materials.append(material)
-    _link(scene, mesh, pose)
+    return _link(scene, mesh, pose)
 
 
 def render(
@@ -254,10 +261,10 @@ def render(
             {RELIT[0]: {"rectangle_to_world_z_up": light_pose.tolist(), "radiance": list(RELIT[1][1:])}}, indent=1
         )
     )
-    _relight(scene, room, light_pose)
+    light = relight(scene, light_pose, RELIT[1][1:])
     for k, pose in enumerate(held_poses[: max(1, held_out // 3)]):
         shoot(pose, truth / f"relight_{RELIT[0]}" / f"view_{k:03d}.exr")
-    bpy.data.objects.remove(scene.collection.objects["light"])
+    bpy.data.objects.remove(light)
     _override(scene)
     scene.cycles.samples, scene.cycles.use_denoising = 16, False
     for k, pose in enumerate(held_poses):

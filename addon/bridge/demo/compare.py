@@ -16,7 +16,8 @@ from .room import room
 def comparison(capture: Path, result: Path) -> str:
     """A table of what materials.json says of each object beside what is true.
 
-    Base colours are means over the surface that the frames see; what they don't see nobody can recover.
+    Base colours are means over the surface that the frames see, of all parts of an object; what they don't see nobody
+    can recover. Model, roughness, F0 and lamp are the main part's.
 
     Parameters
     ----------
@@ -25,7 +26,8 @@ def comparison(capture: Path, result: Path) -> str:
     """
     truth = json.loads((capture / "truth" / "materials.json").read_text())
     true_colours = seen_albedo(read_capture(capture))
-    recovered = {item["object_id"]: item for item in json.loads((result / "materials.json").read_text())["objects"]}
+    entries = json.loads((result / "materials.json").read_text())["objects"]
+    recovered = {entry["object_id"]: entry for entry in entries}
     rows = [("object", "model", "base colour", "(true)", "roughness", "(true)", "F0", "(true)", "lamp", "(true)")]
     for true in truth:
         if true["id"] not in recovered:
@@ -33,7 +35,7 @@ def comparison(capture: Path, result: Path) -> str:
             continue
         entry, glossy = recovered[true["id"]], true["alpha"] is not None
         material = from_json(entry)
-        colour = material.model.base_color(np.float32([entry["evidence"]["albedo"]]), material)[0]
+        colour = base_color([part for part in entries if true["id"] in (part["object_id"], part.get("part_of"))])
         pairs = (
             (None if material.model.gives_light else colour, None if true["emission"] else true_colours[true["id"]]),
             (None if material.alpha is None else material.alpha**0.5, true["alpha"] ** 0.5 if glossy else None),
@@ -43,6 +45,17 @@ def comparison(capture: Path, result: Path) -> str:
         rows.append([true["class_name"], material.model.name, *(numbers(value) for pair in pairs for value in pair)])
     widths = [max(map(len, column)) for column in zip(*rows)]
     return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
+
+
+def base_color(parts: list[dict]) -> np.ndarray:
+    """Mean base colour of an object's parts, entries of materials.json, over what the frames see of them."""
+    materials = [from_json(part) for part in parts]
+    colours = [
+        material.model.base_color(np.float32([part["evidence"]["albedo"]]), material)[0]
+        for part, material in zip(parts, materials)
+    ]
+    seen = [part["evidence"]["area"] * part["evidence"]["seen_share"] for part in parts]
+    return np.average(colours, axis=0, weights=seen if any(seen) else None)
 
 
 def numbers(value) -> str:
