@@ -9,6 +9,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge.demo.compare import base_color  # noqa: E402
 from addon.bridge.demo.render import SIZES, is_rendered, render_capture  # noqa: E402
 from addon.bridge.demo.room import room, tour  # noqa: E402
 from addon.core.errors import StorageError  # noqa: E402
@@ -117,6 +118,16 @@ def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
     ):
         raise RuntimeError("Error: it fell over.\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_colour_of_an_object_is_its_parts_by_what_is_seen_of_them():
+    def part(area, seen, albedo):
+        evidence = {"area": area, "seen_share": seen, "albedo": albedo}
+        return {"object_id": 0, "class_name": "sofa", "model": "lambertian", "evidence": evidence}
+
+    red, blue, unseen = part(1.0, 1.0, [0.8, 0, 0]), part(4.0, 0.75, [0, 0, 0.4]), part(9.0, 0.0, [0, 1, 0])
+    np.testing.assert_allclose(base_color([red, blue, unseen]), [0.2, 0, 0.3], rtol=1e-6)
+    np.testing.assert_allclose(base_color([unseen]), [0, 1, 0])
 
 
 @pytest.mark.slow
