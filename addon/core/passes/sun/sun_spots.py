@@ -110,11 +110,11 @@ class Spots:
             return shadow(self.scene, Sun(direction, np.ones(3), radius), self.position, self.normal, self.edge, 0)[0]
         return visible(self.scene, direction, self.position, self.normal)
 
-    def lit_around(self, direction: np.ndarray) -> np.ndarray:
-        """Whether places around the elements, and the elements from directions around one, are lit, (16, m) bool."""
+    def lit_around(self, direction: np.ndarray, margin: float) -> np.ndarray:
+        """Whether places `margin` metres beside the elements, and they from around a direction, are lit, (16, m)."""
         right, up = tangent_frame(self.normal)
         angle = np.arange(8)[:, None, None] * (np.pi / 4)
-        beside = self.position + np.float32(SUN.margin * (np.cos(angle) * right + np.sin(angle) * up))
+        beside = self.position + np.float32(margin * (np.cos(angle) * right + np.sin(angle) * up))
         places = [visible(self.scene, direction, place, self.normal) for place in beside]
         return np.stack(places + [self.contribution(towards) for towards in ring(direction, RADII[-1])]) > 0
 
@@ -144,10 +144,18 @@ class Edges:
     def _two_sides(self, direction: np.ndarray, lit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What a direction lights ((m,) bool) and the nearest in its shade, all off the shadow's edge, (k,) int each.
 
-        Beside the edge the lit look dark, and so are the last to be clipped, the others bright.
+        Beside the edge the lit look dark, and so are the last to be clipped, the others bright. Where sun falls on
+        bars and reveals alone nothing is as far from an edge, and what is nearer has to do.
         """
+        for margin in (SUN.margin, SUN.margin / 2, SUN.margin / 4):
+            a, b = self._off_edge(direction, lit, margin)
+            if len(a) >= LEVELS.enough:
+                break
+        return a, b
+
+    def _off_edge(self, direction: np.ndarray, lit: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         spots = self.spots
-        lit_around = spots.lit_around(direction)
+        lit_around = spots.lit_around(direction, margin)
         bright = np.flatnonzero(lit & lit_around.all(0))
         shade = np.flatnonzero(~lit & ~lit_around.any(0) & ~spots.clipped)
         if not len(bright) or not len(shade):
