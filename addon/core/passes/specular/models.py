@@ -210,7 +210,7 @@ def adopt_from_class(
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
     model, weighted by evidence. Members keep their own lobe where it fits significantly better than that. Objects whose
     own frames decide nothing adopt the class's if the frames of all members together are sure of a lobe, but not where
-    it raises their cost by more than `LEVELS.gain`.
+    it raises their cost by more than `LEVELS.gain`, and a metal's only where they may be all lobe (`CHOICE.bare`).
     Transparent objects neither give nor take. In a class of metals, a member whose frames favour metal, but not
     significantly, becomes one, as rough as the others unless its frames are sure of something else. In a class of
     dielectrics, a metal that a dielectric's lobe fits nearly as well becomes a dielectric.
@@ -241,7 +241,7 @@ def adopt_from_class(
                 note = "Like a metal, but not beyond doubt; others of its class are not."
                 fit = _own_or_class_lobe(choice.dielectric, shared.lobe, shared.model, problems.get(i))
                 result[i] = replace(choice, model=shared.model, fit=fit, note=note)
-            elif not choice.model.has_lobe and agreed and not _contradicted(shared.lobe, choice.fit, problems.get(i)):
+            elif not choice.model.has_lobe and agreed and not _contradicted(shared, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(shared, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model is shared.model and len(glossy) > 1 and i in problems:
@@ -287,16 +287,26 @@ def _pooled(choices: list[Choice], best: Choice) -> Choice:
     return replace(best, fit=replace(best.lobe, phi=phi, psi=np.array(psi)))
 
 
-def _contradicted(lobe: LobeFit, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
-    """Whether an object's own frames contradict its class's lobe."""
+def _contradicted(shared: Choice, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
+    """Whether an object's own frames contradict its class's lobe, or that it has nothing but that, as a metal has."""
     if problem is None or len(np.unique(problem.element)) < LEVELS.few:
         return False
+    lobe = shared.lobe
     if own_lobe is not None:
         # How its diffuse part darkens remains the object's own, with the class's lobe as without.
         lobe = replace(
             lobe, kappa=own_lobe.kappa, kappa_lambertian=own_lobe.kappa_lambertian, residual=own_lobe.residual
         )
-    return gain_of(lobe, problem)[0] < -LEVELS.gain
+    if gain_of(lobe, problem)[0] < -LEVELS.gain:
+        return True
+    return shared.model.lobe_alone and not _may_be_bare(problem, lobe)
+
+
+def _may_be_bare(problem: Problem, fit: LobeFit) -> bool:
+    """Whether a metal's lobe, with nothing of each element's own, costs no more than `CHOICE.bare` allows."""
+    dense, scale = _weighted(DenseProblem(problem), fit)
+    _, diffuse = element_costs(dense, fit, scale)
+    return bool(_bare_metal(problem, dense, fit.phi, fit, scale)[1].sum() <= CHOICE.bare * diffuse.sum())
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:
