@@ -91,7 +91,8 @@ def _fit_mirror(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[n
         Of the mesh's plane.
     """
     deviation, own_deviation, correlation, f0 = views.compare(facing)
-    if not (deviation < own_deviation and correlation > MIRRORS.together and f0.mean() > MIRRORS.least_f0):
+    alike = deviation < own_deviation and correlation > MIRRORS.together
+    if not (alike and MIRRORS.least_f0 < f0.mean() < MIRRORS.most_f0):
         return None
     tangents = tangents_of(normal)
     sample = views.part(np.arange(0, len(views), -(-len(views) // LEVELS.sample)))

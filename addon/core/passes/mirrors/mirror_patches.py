@@ -149,5 +149,6 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     variance = around(a * a)
     correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
     unexplained = around((observed - predicted - f0[group]) ** 2) / np.maximum(variance, 1e-12)
-    mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & (f0 > np.log(MIRRORS.least_f0))
+    possible = (f0 > np.log(MIRRORS.least_f0)) & (f0 < np.log(MIRRORS.most_f0))
+    mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & possible
     return element, mirrored, unexplained, log_f0

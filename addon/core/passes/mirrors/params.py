@@ -20,6 +20,9 @@ class MirrorsParams:
         explain (`mirror_patches`).
     least_f0 : float
         A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
+    most_f0 : float
+        A mirror sends no more than it gets, 1; twice that if the room's light is off. A page of a book under a spot
+        sent 4 to 9 times what it would have mirrored, and followed it.
     tells : float
         Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark
         hearth shows tells nothing of its normal: it was turned by a degree to take a hundredth off.
@@ -34,6 +37,7 @@ class MirrorsParams:
     together: float = 0.6
     unexplained: float = 0.3
     least_f0: float = 0.2
+    most_f0: float = 2.0
     tells: float = 0.98
     stray: float = 0.5
     tilt: float = 0.01

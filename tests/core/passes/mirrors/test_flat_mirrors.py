@@ -57,7 +57,7 @@ def test_the_plane_of_a_scan_is_put_right(box):
 
 @pytest.mark.parametrize(
     ("f0", "diffuse"),
-    [(0.0, 0.5), (0.04, 0.3), (0.06, 0.0)],  # diffuse; lacquer; a black pane
+    [(0.0, 0.5), (0.04, 0.3), (0.06, 0.0), (5.0, 0.0)],  # diffuse; lacquer; a black pane; more than it gets
 )
 def test_what_is_no_mirror(box, f0, diffuse):
     assert find_mirrors(box.field, (), frames(box, f0, diffuse), FLOOR) == ()

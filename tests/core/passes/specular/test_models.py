@@ -117,6 +117,18 @@ def test_the_others_of_its_class_are_metal(seen):
         assert result[1].model == METAL and result[1].fit.phi == (sure if seen_enough else broad).fit.phi
 
 
+def test_paint_among_metals_stays_paint_however_noisy(seen):
+    """A broad lobe hardly tells in noisy views; but a metal is all lobe, and this floor's paint is no lobe's."""
+    broad = choose_model(seen["metal"])
+    broad = replace(broad, fit=replace(broad.fit, phi=0.5, psi=broad.fit.psi / 5))
+    problem = seen["diffuse"]
+    noise = np.exp(0.3 * np.random.default_rng(3).normal(size=(len(problem.element), 1)))
+    noisy = replace(problem, radiance=(problem.radiance * noise).astype(np.float32))
+    own = choose_model(noisy)
+    assert own.model == LAMBERTIAN and own.metal is None
+    assert adopt_from_class({0: broad, 1: own}, {1: noisy}, dict.fromkeys(range(2), "frame"))[1] is own
+
+
 def test_the_others_of_its_class_are_no_metal(seen):
     """One hardly surer to be metal than dielectric is what the sure ones of its class are; alone it is metal."""
     sure = choose_model(seen["glossy"])
