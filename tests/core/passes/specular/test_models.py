@@ -129,6 +129,16 @@ def test_paint_among_metals_stays_paint_however_noisy(seen):
     assert adopt_from_class({0: broad, 1: own}, {1: noisy}, dict.fromkeys(range(2), "frame"))[1] is own
 
 
+@pytest.mark.parametrize(("gain", "sigmas", "model"), [(0.005, 3.5, LAMBERTIAN), (0.05, 3.5, DIELECTRIC)])
+def test_a_class_has_to_gain_by_a_lobe_as_one_object_has_to(seen, gain, sigmas, model):
+    """Errors of the light are alike for many of a kind: together they are sure of a lobe that hardly serves them."""
+    sure, diffuse = choose_model(seen["glossy"]), choose_model(seen["diffuse"])
+    others = replace(diffuse, fit=replace(sure.fit, psi=sure.fit.psi / 4), gain=gain, sigmas=sigmas, metal=None)
+    weak = replace(sure, fit=others.fit, gain=0.03, sigmas=4.0)
+    result = adopt_from_class({0: weak} | dict.fromkeys(range(1, 9), others), {}, dict.fromkeys(range(9), "cupboard"))
+    assert {result[i].model for i in range(1, 9)} == {model} and result[0].model == DIELECTRIC
+
+
 def test_the_others_of_its_class_are_no_metal(seen):
     """One hardly surer to be metal than dielectric is what the sure ones of its class are; alone it is metal."""
     sure = choose_model(seen["glossy"])
