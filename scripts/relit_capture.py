@@ -1,12 +1,12 @@
 """A capture of a real-looking room in other light, and of other materials: a recovered scene is the truth.
 
-    python -m scripts.relit_capture CAPTURE SCENE.blend OUT [--off ID,...|all] [--scale ID=K ...] [--sky K]
+    python -m scripts.relit_capture CAPTURE SCENE.blend OUT [--off ID,...] [--scale ID=K ...] [--sky K]
         [--sun X,Y,Z,STRENGTH] [--materials SEED] [--every 2] [--samples 32] [--views 6]
 
 CAPTURE is one with truth/ (its mesh, poses and held-out views are taken over) and SCENE.blend what
 `scan-relight recover CAPTURE --without material-parts` wrote of it. The lights are changed, with --materials each class
-of objects gets another matter, colour and roughness, and Cycles renders frames and truth. What is found of OUT is
-scored like any capture. Generated rooms have boxes for furniture; these have what artists modelled.
+of objects gets another tint, roughness and lobe, and Cycles renders frames and truth. What is found of OUT is scored
+like any capture. Generated rooms have boxes for furniture; these have what artists modelled.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--scale", action="append", default=[], help="ID=K: an object's light K times as strong")
     parser.add_argument("--sky", type=float, default=1.0, help="how many times as bright as it is")
     parser.add_argument("--sun", default="", help="X,Y,Z,STRENGTH: where it is, and its irradiance in W/m^2")
-    parser.add_argument("--materials", type=int, metavar="SEED", help="classes get other matters")
+    parser.add_argument("--materials", type=int, metavar="SEED", help="classes get other tints, roughnesses and lobes")
     parser.add_argument("--every", type=int, default=2, help="each how manyth of the frames")
     parser.add_argument("--samples", type=int, default=32)
     parser.add_argument("--views", type=int, default=6)

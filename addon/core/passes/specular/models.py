@@ -282,7 +282,8 @@ def _jointly_significant(members: dict[int, Choice]) -> bool:
 def _gains_enough(members: dict[int, Choice], problems: dict[int, Problem]) -> bool:
     """Whether a class's members gain by lobes, as one object would have to: their mean, weighted by observations.
 
-    Under hard light 16 matt cupboards were sure of a lobe together, 15 of which it hardly served.
+    Under hard light 16 matt cupboards were sure of a lobe together that took .010 off their cost; classes that have one
+    gained .03 to .22.
     """
     judged = [i for i, choice in members.items() if choice.fit is not None and choice.looks is None]
     known = {i: len(problems[i].element) for i in judged if i in problems}
