@@ -17,13 +17,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from addon.bridge.data.materials import BASE_COLOR, EMISSION_STRENGTH, IOR, METALLIC, ROUGHNESS, SPECULAR_LEVEL
 from addon.bridge.data.nodes import add_node, feed, find_node
 from addon.core.io.exr import write_exr
 
-from .qa_rooms.render import STRENGTHS, relight
+from .qa_rooms.render import STRENGTHS, add_sun, relight
 
 MIRROR = 0.05
 """Metals with less roughness stay as they are: a mirror is no paint."""
@@ -111,12 +110,8 @@ def change_lights(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
     if sky:
         sky.inputs["Strength"].default_value *= options.sky
     if options.sun:
-        *towards, power = map(float, options.sun.split(","))
-        light = bpy.data.lights.new("sun", "SUN")
-        light.energy, light.angle = power, np.radians(0.53)
-        sun = bpy.data.objects.new("sun", light)
-        sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
-        scene.collection.objects.link(sun)
+        *place, power = map(float, options.sun.split(","))
+        add_sun(scene, -np.array(place), (1, 1, 1), power, np.radians(0.53))
 
 
 def render(scorer, scene: bpy.types.Scene, options: argparse.Namespace, truths: list[dict]) -> None:

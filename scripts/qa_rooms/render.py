@@ -109,10 +109,14 @@ def build(room: FurnishedRoom, scene) -> None:
             pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = np.cross(u, -n), u, -n, middle
             _link(scene, light, pose)
     if room.sun:
-        towards, colour, power = room.sun
-        light = bpy.data.lights.new("sun", "SUN")
-        light.energy, light.color, light.angle = power, colour, np.radians(1.5)
-        _link(scene, light, look_at((0, 0, 0), towards))
+        add_sun(scene, *room.sun, np.radians(1.5))
+
+
+def add_sun(scene, towards, colour: tuple[float, float, float], power: float, angle: float) -> None:
+    """A sun whose light goes `towards` a direction ((3,)), of an irradiance in W/m^2 and a disc's angle in radians."""
+    light = bpy.data.lights.new("sun", "SUN")
+    light.energy, light.color, light.angle = power, colour, angle
+    _link(scene, light, look_at((0, 0, 0), towards))
 
 
 def _link(scene, data, pose) -> bpy.types.Object:
