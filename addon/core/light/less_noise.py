@@ -62,8 +62,18 @@ def less_noise(
     return (result / np.float32(LESS_NOISE.grids)), np.sqrt(noise_square / LESS_NOISE.grids).astype(np.float32)
 
 
-def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def cells(
+    position: np.ndarray, normal: np.ndarray, shift: float, scale: float = 1.0
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Elements by cells of position and of the direction that they face, some whole cells at once.
+
+    Parameters
+    ----------
+    position, normal : (m, 3) float32
+    shift : float
+        Of the grid, in cells.
+    scale : float
+        How many times as wide the cells are.
 
     Yields
     ------
@@ -83,7 +93,7 @@ def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> Iterator[tu
 
     # One axis after the other: all six at once were the most memory that a large room took.
     for coordinate in position.T:
-        append_to_key(np.floor(coordinate / LESS_NOISE.cell + shift))
+        append_to_key(np.floor(coordinate / (scale * LESS_NOISE.cell) + shift))
     for facing in normal.T:
         append_to_key(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
     order = np.argsort(key, kind="stable")

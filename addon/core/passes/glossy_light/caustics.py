@@ -29,6 +29,7 @@ from ...light.params import LESS_NOISE
 from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
+from ...significance import LEVELS
 from .params import CAUSTICS
 
 AT_ONCE: Block[int] = 1 << 15
@@ -100,9 +101,8 @@ def caustics(
     (n, 3) float32
         Radiance * steradian, for every element.
     """
-    count = len(room.atlas)
     if not len(bright) or not gloss.alpha.any():
-        return np.zeros((count, 3), np.float32)
+        return np.zeros((len(room.atlas), 3), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
     landed, power = [], []
@@ -128,9 +128,7 @@ def caustics(
             element, place, index = _traced(room, outgoing)
             landed.append(element)
             power.append(outgoing.power[index])
-    at = np.concatenate(landed)
-    total = np.stack([np.bincount(at, values, count).astype(np.float32) for values in np.concatenate(power).T])
-    return _over_cells(room.atlas, total, threads)
+    return _over_cells(room.atlas, np.concatenate(landed), np.concatenate(power), threads)
 
 
 def _traced(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -162,17 +160,31 @@ def _scattered(room: LightField, gloss: Gloss, element: np.ndarray, light: _Ligh
     return _Light(origin, direction, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, power: np.ndarray, threads: int) -> np.ndarray:
-    """Power ((3, n)) over area, (n, 3) float32: means over cells of several shifted grids."""
-    result, area = np.zeros((3, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
+def _over_cells(atlas: Atlas, at: np.ndarray, power: np.ndarray, threads: int) -> np.ndarray:
+    """Power of photons over area, (n, 3) float32: means over cells of several shifted grids.
 
-    def add(portion: tuple[np.ndarray, np.ndarray]) -> None:
-        elements, group = portion
-        for row, values in zip((*result, area), (*power, atlas.area), strict=True):
-            row[elements] += np.bincount(group, values[elements])[group]
+    Where a cell got too few photons for a mean, what it got is spread over a cell twice as wide, together with what
+    others of that kind got there: all power stays. Few is told by Kish's effective sample size, (sum w)^2 / sum w^2.
+    """
+    count, weight = len(atlas), np.abs(power).sum(1)
+    columns = (*power.T, weight, weight**2)
+    landed = [np.bincount(at, values, count).astype(np.float32) for values in columns] + [atlas.area]
+    result = np.zeros((3, count), np.float32)
+
+    def spread(portion: tuple[np.ndarray, np.ndarray, int]) -> np.ndarray:
+        """Add the means of cells with no less than the least sample; returns the elements of the others."""
+        elements, group, least = portion
+        *total, weights, squares, area = (np.bincount(group, values[elements]) for values in landed)
+        enough = (weights**2 >= least * squares)[group]
+        for row, values in zip(result, total, strict=True):
+            row[elements[enough]] += (values / np.maximum(area, 1e-12))[group[enough]]
+        return elements[~enough]
 
     for k in range(LESS_NOISE.grids):
-        for _ in ordered_map(add, cells(atlas.position, atlas.normal, k / LESS_NOISE.grids), threads):
-            pass
-    result /= np.maximum(area, np.float32(1e-12))
-    return result.T
+        left = np.arange(count)
+        for doubled in range(CAUSTICS.doublings + 1):
+            least = LEVELS.enough if doubled < CAUSTICS.doublings else 0
+            portions = cells(atlas.position[left], atlas.normal[left], k / LESS_NOISE.grids, 2.0**doubled)
+            places = ((left[index], group, least) for index, group in portions)
+            left = np.concatenate([left[:0], *ordered_map(spread, places, threads)])
+    return result.T / np.float32(LESS_NOISE.grids)

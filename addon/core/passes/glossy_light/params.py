@@ -42,10 +42,13 @@ class CausticsParams:
         Glossy reflections in a row. Beside copper shades half of the light on a kitchen's wall came by no other way,
         and a third of that by more than one; its albedo with 1 and 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96;
         no more by 10.
+    doublings : int
+        Of a cell's edge, where too few photons fell.
     """
 
     photons: int = 1 << 18
     bounces: int = 4
+    doublings: int = 3
 
 
 CAUSTICS = CausticsParams()

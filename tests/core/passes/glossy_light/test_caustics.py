@@ -41,6 +41,16 @@ def test_a_lamp_over_a_polished_floor(dark):
     assert np.corrcoef(found[some].mean(1), truth.mean(1))[0, 1] > 0.97
 
 
+def test_few_photons_leave_no_stains(dark):
+    """In cells of one size single photons stood out as twice the brightest place."""
+    lobes, at = on_the_floor(dark, 0.4), above(dark)
+    few, many = (caustics(dark.field, dark.bright, lobes, photons=photons) for photons in (MANY >> 6, MANY))
+    area = dark.room.atlas.area[at]
+    assert np.average(few[at], 0, area) == pytest.approx(np.average(many[at], 0, area), rel=0.02)
+    assert few[at].max() < 1.1 * many[at].max()
+    assert np.sqrt(((few - many)[at] ** 2).mean()) < 0.5 * many[at].mean()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("phi", [0.1, 0.4])
 def test_a_rough_floor(dark, phi):
