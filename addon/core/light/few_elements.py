@@ -78,18 +78,17 @@ def filled_radiance(field: LightField) -> np.ndarray:
     return radiance
 
 
-def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarray:
-    """E of a few elements by both estimators, and from the sun, (m, 3) float64."""
+def irradiance_at(field: LightField, element: np.ndarray, seed: int, more: int = 1) -> np.ndarray:
+    """E of a few elements by both estimators, with `more` times the rays, and from the sun, (m, 3) float64."""
     bright, portals = bright_triangles(field), find_portals(field, seed)
+    rays, emitter_rays = more * LIGHT_FIT.rays, more * LIGHT_FIT.emitter_rays
     position, normal = field.atlas.position[element], field.atlas.normal[element]
     E = np.empty((len(element), 3))
 
     def run(part: slice) -> None:
         p, n, block_seed = position[part], normal[part], seed + part.start
-        indirect, _, _ = gather(
-            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, block_seed, portals, LIGHT_FIT.emitter_rays
-        )
-        E[part] = indirect + direct(field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, block_seed + 1)[0]
+        indirect, _, _ = gather(field, bright, p, n, rays, emitter_rays, block_seed, portals, emitter_rays)
+        E[part] = indirect + direct(field, bright, p, n, rays, emitter_rays, block_seed + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
     return E + from_sun(field, element)

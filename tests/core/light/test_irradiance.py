@@ -10,6 +10,7 @@ import pytest
 from addon.core.light import emitters
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.environment import Environment
+from addon.core.light.few_elements import irradiance_at
 from addon.core.light.irradiance import direct, gather
 from addon.core.light.params import GATHER
 from tests.core.rooms import box_sides, lit_box, make_room, polygon_irradiance, quad
@@ -151,3 +152,16 @@ def test_radius_is_the_harmonic_mean_distance():
     at, up = np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]])
     _, radius, _ = gather(field, bright_triangles(field), at, up, 1024, 0, 0)
     assert radius[0] == pytest.approx(3.0, rel=0.01)
+
+
+def test_more_rays_at_a_few_elements_leave_less_noise():
+    """What an unseen lamp is solved under: noise of the light that is known draws its radiance up."""
+    room = make_room([*box_sides(), quad((1, 1, 1.5), (0, 0.5, 0), (0.5, 0, 0), 7)], 0.25)
+    rng = np.random.default_rng(0)
+    radiance = rng.gamma(0.3, 1.0, (len(room.atlas), 1)).repeat(3, 1).astype(np.float32)
+    field, some = room.field(radiance), np.arange(0, len(room.atlas), 29)
+
+    def noise(more: int) -> float:
+        return float(np.std([irradiance_at(field, some, seed, more)[:, 0] for seed in range(6)], 0).mean())
+
+    assert noise(4) < 0.7 * noise(1)

@@ -24,8 +24,9 @@ from .params import SUN
 from .sun_spots import RADII, Edges, Guess, Spots, ring, visible
 
 GRID = float(np.radians(4.0))
-SHARP = np.radians([2.0, 1.0, 0.5])
-"""Steps of the direction, with a point-like sun."""
+RINGS = np.radians([1.0, 2.0, 3.0])
+"""Around a direction of the grid, with a point-like sun: as far as to the corners of its cell."""
+SHARP = np.radians([0.5])
 ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
 
@@ -35,10 +36,15 @@ def _candidates(even: Spots, wide: Edges) -> list[Guess]:
     directions = _reaching_most(even, np.flatnonzero(even.stands_out()))
     guesses = list(ordered_map(wide.contrast, directions, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
-    refined = ordered_map(
-        lambda guess: _pattern_search(wide.contrast, guess, SHARP), _distinct(guesses)[: SUN.refined], 0
-    )
+    refined = ordered_map(lambda guess: _within_cell(wide.contrast, guess), _distinct(guesses)[: SUN.refined], 0)
     return _distinct(list(refined))[: SUN.tried]
+
+
+def _within_cell(cost: Callable[[np.ndarray], Guess], guess: Guess) -> Guess:
+    """The direction of least cost in a cell of the grid: every degree first, as bars of a window make minima."""
+    directions = (d for k, radius in enumerate(RINGS, 1) for d in ring(guess.direction, radius, 6 * k) if d[2] > 0)
+    best = min((guess, *map(cost, directions)), key=lambda candidate: candidate.cost)
+    return _pattern_search(cost, best, SHARP)
 
 
 def _reaching_most(spots: Spots, index: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
 from ...significance import LEVELS
 from .params import UNSEEN
-from .sky import Sky
+from .sky import Sky, all_light
 from .unseen_lamps import needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
 
@@ -134,19 +134,16 @@ def find_light(
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
     dark, room_radiance, unlit = np.zeros_like(field.radiance), filled_radiance(field), field.with_sun(None)
-    received = previous.received if previous else irradiance_at(unlit.with_light(room_radiance, known), element, seed)
-    sky_contributions = (
-        previous.sky
-        if previous
-        else [
-            irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
-        ]
-    )
-    sunless = received
-    if field.sun is not None:
-        received = received + from_sun(field, element)
+    lights = [unlit.with_light(room_radiance, known)]
+    lights += [unlit.with_light(dark, Environment.only(zone.pattern)) for zone in zones]
+    if previous:
+        sunless, sky_contributions = previous.received, previous.sky
+    else:
+        sunless, *by_sky = (irradiance_at(light, element, seed) for light in lights)
+        sky_contributions = [G[:, 0] for G in by_sky]
+    sunlit = from_sun(field, element)
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
-    filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
+    filled = sunless + sunlit + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = bright_all_over(field, element, filled)
     if before is None and "unseen-lamps" not in without:
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
@@ -158,8 +155,16 @@ def find_light(
         lit &= flat[element]
     if lit.sum() < LEVELS.enough:
         return Light(tuple(seen), environment, sky_notes, element, filled, mixed=mixed)
-    sent = field.radiance[element[lit]].astype(np.float64)
-    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
+    tells = element[lit]
+    earlier = previous if previous is not None and np.array_equal(previous.element, tells) else None
+    if earlier is None and (unseen_objects or zones):
+        sunless[lit] = irradiance_at(lights[0], tells, seed, LIGHT_FIT.more_rays)
+        for G, light in zip(sky_contributions, lights[1:], strict=True):
+            G[lit] = irradiance_at(light, tells, seed, LIGHT_FIT.more_rays)[:, 0]
+    received = (sunless + sunlit)[lit]
+    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
+    sent = field.radiance[tells].astype(np.float64)
+    sample = Sample(tells, atlas.object_id[tells], sent, all_light(received, [], {}, sky))
     # The same lamp hung several times is one unknown.
     kin = of_shining_class(seen, atlas.object_id[good], kinds)
     groups: dict[int, list[int]] = {}
@@ -171,7 +176,6 @@ def find_light(
         others = [i for i in groups if i not in kin]
         best = reaching_most(field, sample.element, [groups[i] for i in others], LEVELS.most, seed)
         groups = {i: groups[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
-    earlier = previous if previous is not None and np.array_equal(previous.element, sample.element) else None
     if earlier is not None:
         contribution, min_luminance = earlier.lamps, earlier.min_luminance
     else:
@@ -182,12 +186,11 @@ def find_light(
         lit_room = field.with_light(room_radiance, environment)
         min_luminance = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
-    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
     certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received[lit])
-        solve_sky(sample, lamps, contribution, sky, received[lit])
-    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], certain)
+        lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received)
+        solve_sky(sample, lamps, contribution, sky, received)
+    lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps

@@ -11,7 +11,8 @@ from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
 from addon.core.light.sun import RADIUS, Sun, extract_sun, insert_sun, sunlight
 from addon.core.luminance import LUMINANCE
-from addon.core.passes.sun.sun_fit import find_sun
+from addon.core.passes.sun.sun_fit import _within_cell, find_sun
+from addon.core.passes.sun.sun_spots import Guess, ring
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.settings import Settings
@@ -50,6 +51,19 @@ def room():
 
 def angle(a, b) -> float:
     return float(np.degrees(np.arccos(np.clip(np.dot(a, b), -1, 1))))
+
+
+@pytest.mark.parametrize("side", range(4))
+def test_bars_of_a_window_do_not_hold_the_search(side):
+    """Beside the sun their shadows fall on one another again: less alike, over a wider range."""
+    sun = np.array(sunny.TOWARDS, np.float32) / np.linalg.norm(sunny.TOWARDS)
+    beside = ring(sun, np.radians(3.0), 4)[side]
+
+    def cost(direction: np.ndarray) -> Guess:
+        there, here = (angle(direction, minimum) for minimum in (sun, beside))
+        return Guess(direction, -max(1 - there / 1.2, 0.6 - here / 4, 0))
+
+    assert angle(_within_cell(cost, cost(beside)).direction, sun) < 0.6
 
 
 def test_a_sun_that_no_frame_sees_is_found_by_its_patch(room):
