@@ -118,7 +118,7 @@ class LightFitParams:
         Of each element that a solution looks at: into its hemisphere, at bright triangles, at openings.
     more_rays : int
         Times those for the light that is known where unseen lamps and skies are solved for: its noise draws what is
-        solved up (errors in variables). Bare spots of a kitchen came out 1.12 times too bright without, 1.07 with.
+        solved up (errors in variables). Bare spots of a kitchen: 1.19 times too bright without, 1.15 with, three seeds.
     emitter_albedo : float
         An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the
         rest is room for missing light and for noise.

@@ -27,6 +27,7 @@ GRID = float(np.radians(4.0))
 RINGS = np.radians([1.0, 2.0, 3.0])
 """Around a direction of the grid, with a point-like sun: as far as to the corners of its cell."""
 SHARP = np.radians([0.5])
+"""Steps from the best of these."""
 ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
 
