@@ -137,7 +137,7 @@ def find_light(
     lights = [unlit.with_light(room_radiance, known)]
     lights += [unlit.with_light(dark, Environment.only(zone.pattern)) for zone in zones]
     if previous:
-        sunless, sky_contributions = previous.received, previous.sky
+        sunless, sky_contributions = previous.received.copy(), [G.copy() for G in previous.sky]
     else:
         sunless, *by_sky = (irradiance_at(light, element, seed) for light in lights)
         sky_contributions = [G[:, 0] for G in by_sky]
