@@ -1,6 +1,5 @@
 """E over the surface: which estimator is evaluated at which elements, and what is interpolated between."""
 
-import functools
 from typing import TypedDict
 
 import numpy as np
@@ -146,19 +145,6 @@ def irradiance(
         aiming.next()
         return result
 
-    def shine(sun: Sun, index: np.ndarray) -> np.ndarray:
-        """The sun's part of E and its error, (k, 4) float32."""
-        result, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
-
-        def run(part: slice) -> None:
-            elements = element[index[part]]
-            result[part] = sunlight(
-                field.scene, sun, atlas.position[elements], atlas.normal[elements], edge, seed + 2 + part.start
-            )
-
-        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
-        return result
-
     value = blocks.evaluate(around, step, np.inf)
     total, escaped = value[:, :3].copy(), value[:, 3].copy()
     error = value[:, 4] * total.mean(1)
@@ -170,7 +156,45 @@ def irradiance(
     if smooth:
         total, error = less_noise(atlas.position[element], atlas.normal[element], total, error, threads=threads)
     if field.sun is not None:
-        sunlit = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
+        sunlit = _from_sun(field, field.sun, blocks, element, step, total.mean(1), threads, seed)
         total += sunlit[:, :3]
         error = np.hypot(error, sunlit[:, 3])
     return total, escaped, points, error / np.maximum(total.mean(1), 1e-20)
+
+
+def sun_irradiance(field: LightField, element: np.ndarray, around: np.ndarray, threads: int, seed: int) -> np.ndarray:
+    """The sun's part of E at elements ((m,) int) of a field that has one, (m, 3) float32.
+
+    `around`, (m,) float, is E there, which the sun's part is judged beside.
+    """
+    blocks, step = TexelBlocks(field.atlas, element, threads), block_step(field.atlas)
+    sun = field.sun
+    assert sun is not None
+    return _from_sun(field, sun, blocks, element, step, around, threads, seed)[:, :3]
+
+
+def _from_sun(
+    field: LightField,
+    sun: Sun,
+    blocks: TexelBlocks,
+    element: np.ndarray,
+    step: int,
+    around: np.ndarray,
+    threads: int,
+    seed: int,
+) -> np.ndarray:
+    """The sun's part of E and its error at elements that `blocks` were made of, (m, 4) float32."""
+
+    def shine(index: np.ndarray) -> np.ndarray:
+        result, edge, atlas = np.empty((len(index), 4), np.float32), field.atlas.texel_edge, field.atlas
+
+        def run(part: slice) -> None:
+            elements = element[index[part]]
+            result[part] = sunlight(
+                field.scene, sun, atlas.position[elements], atlas.normal[elements], edge, seed + 2 + part.start
+            )
+
+        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
+        return result
+
+    return blocks.evaluate(shine, step, GATHER.smooth, around)

@@ -5,7 +5,10 @@ its part of E comes from shadow rays at every place (`sunlight`), and it goes ba
 (`insert_sun`). One that no frame saw is solved for (`sun_fit`).
 """
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -36,15 +39,40 @@ class Sun:
         Of its disc, radians.
     seen : bool
         False: solved for from the light that it throws.
-    note : str
-        How it was found, one sentence.
+    edges : (float, float), optional
+        Of one that was solved for: mean differences of log albedo across its edges, without it and with it.
     """
 
     direction: np.ndarray
     irradiance: np.ndarray
     radius: float = RADIUS
     seen: bool = False
-    note: str = ""
+    edges: tuple[float, float] | None = None
+
+    @property
+    def note(self) -> str:
+        """How it was found, one sentence."""
+        if self.edges is None:
+            return f"The frames see the sun: {self.where()}."
+        before, after = self.edges
+        return (
+            f"A sun that no frame sees was solved from the patch of light that it throws: {self.where()} "
+            f"(differences of log albedo across its edges {before:.3f} to {after:.3f})."
+        )
+
+    def as_lists(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "direction": np.asarray(self.direction).tolist(), "irradiance": np.asarray(self.irradiance).tolist(),
+            "radius": float(self.radius), "seen": bool(self.seen), "edges": self.edges,
+        }  # fmt: skip
+
+    @staticmethod
+    def from_lists(entry: dict[str, Any]) -> Sun:
+        """What `as_lists` gave."""
+        direction, irradiance = (np.asarray(entry[name], np.float32) for name in ("direction", "irradiance"))
+        edges = entry["edges"] and tuple(entry["edges"])
+        return Sun(direction, irradiance, entry["radius"], entry["seen"], edges)
 
     def where(self) -> str:
         """Its place and strength in words."""
@@ -160,8 +188,7 @@ def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
     middle = (directions * (luminance * solid_angle * sun_texels)[..., None]).sum((0, 1))
     direction = (middle / np.linalg.norm(middle)).astype(np.float32)
     dark = np.where(sun_texels[..., None], np.float32(sky), environment.radiance).astype(np.float32)
-    sun = Sun(direction, np.maximum(flux, 0).astype(np.float32), RADIUS, True)
-    return environment.refilled(dark), replace(sun, note=f"The frames see the sun: {sun.where()}.")
+    return environment.refilled(dark), Sun(direction, np.maximum(flux, 0).astype(np.float32), RADIUS, True)
 
 
 def insert_sun(environment: Environment, sun: Sun | None) -> np.ndarray:

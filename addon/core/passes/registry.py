@@ -104,6 +104,7 @@ PASSES = (
         unlit_lamps="Has windows and screens dark with their light off, and bright pieces of walls as their walls.",
         specular_removal="Takes the fitted specular part out of every observation, and the median of what is left.",
         glossy_light="Lights the room by what glossy things really reflect.",
+        sun_strength="Solves again for a sun's irradiance, once the specular part of the lit diffuse texture is known.",
         caustics="Follows light from bright triangles over glossy things by photons.",
     ),
     *_passes_of(

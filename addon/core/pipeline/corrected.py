@@ -15,7 +15,7 @@ from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
 from ..evidence.light import spots
 from ..light.over_surface import RayCounts, irradiance
-from ..light.sun import insert_sun
+from ..light.sun import Sun, insert_sun
 from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
@@ -153,9 +153,14 @@ class Corrected(Stages):
         """How sure all of it is."""
         return collect(self.findings)
 
+    @property
+    def sun(self) -> Sun | None:
+        """The sun that frames show or that was solved for, before a known white is heeded."""
+        return self.specular().sun or self.shading().sun
+
     def sky(self) -> np.ndarray:
         """Radiance from outside with the sun in it, (h, w, 3) float32, row 0 the bottom."""
-        sky = insert_sun(self.shading().environment, self.shading().sun)
+        sky = insert_sun(self.shading().environment, self.sun)
         return sky if self.white is None else sky * self.white.of_light
 
 

@@ -155,13 +155,13 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
     }
     if shading.openings is not None:
         figures["unknown_light_share"] = float(shading.openings.share)
-    if shading.sun is not None:
-        sun = shading.sun
+    sun = run.sun
+    if sun is not None:
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
     names = {instance.object_id: instance.name for instance in run.capture.instances}
     warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
-    warnings += shading.notes
+    warnings += [*shading.notes, *([] if sun is None else [sun.note])]
     if above > MISSING.alarm:
         warnings.append(
             f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "

@@ -208,10 +208,9 @@ def shade(
     # Near a crease the light of two sides is mixed.
     if "crease-error" not in without:
         error = np.hypot(error, crease_error(mesh, atlas, atlas.texel_edge))
-    notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(
-        E, escaped, error, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun,
-        field.openings,
+        E, escaped, error, field.radiance, light.lamps, field.environment, light.notes, field.mirrors, points,
+        field.sun, field.openings,
     )  # fmt: skip
 
 
@@ -229,7 +228,7 @@ def to_store(shading: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         arrays |= {f"openings_{field.name}": getattr(shading.openings, field.name) for field in fields(Openings)}
     arrays |= {f"patches_{field.name}": getattr(shading.patches, field.name) for field in fields(Patches)}
     meta = {
-        "sun": shading.sun and {k: np.asarray(v).tolist() for k, v in asdict(shading.sun).items()},
+        "sun": shading.sun and shading.sun.as_lists(),
         "points": shading.points,
         "mirrors": [mirror.as_lists() for mirror in shading.mirrors],
         "notes": list(shading.notes),
@@ -253,14 +252,10 @@ def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
     return Shading(
         arrays["irradiance"], arrays["escaped"], arrays["relative_error"], arrays["radiance"], lamps,
         Environment(arrays["sky"], arrays["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
-        None if meta["sun"] is None else _sun(**meta["sun"]),
+        meta["sun"] and Sun.from_lists(meta["sun"]),
         Openings(
             arrays["openings_low"], arrays["openings_size"], arrays["openings_radiance"],
             float(arrays["openings_share"]), arrays["openings_windows"],
         ) if "openings_low" in arrays else None,
         Patches(*(arrays[f"patches_{field.name}"] for field in fields(Patches))),
     )  # fmt: skip
-
-
-def _sun(direction: list[float], irradiance: list[float], **options: Any) -> Sun:
-    return Sun(np.array(direction, np.float32), np.array(irradiance, np.float32), **options)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ import numpy as np
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
 from ..light.field import LightField
+from ..light.over_surface import sun_irradiance
+from ..light.sun import Sun
 from ..memory import give_back
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
@@ -22,6 +24,7 @@ from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular_removal.removal import SpecularPart, without_specular
+from ..passes.sun.sun_strength import strength_without_gloss
 from ..passes.unlit_lamps.unlit import unlit
 from ..progress import Rounds
 from ..results.overrides import NOTHING, Given, Overrides
@@ -56,15 +59,18 @@ class Specular:
     specular : (n, 3) float32
         Part of each element's L_d that is specular, or came through it from behind.
     excess : (n, 3) float32
-        What is to be added to E, as glossy things reflect more onto each element than their L_d says.
+        What is to be added to E, as glossy things reflect more onto each element than their L_d says, and under `sun`.
     hidden : (n,) bool
         In every view the specular part is more than what remains: L_d says nothing of the albedo.
+    sun : Sun, optional
+        The shading stage's with another irradiance (`sun-strength`).
     """
 
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
     excess: np.ndarray
     hidden: np.ndarray
+    sun: Sun | None = None
 
     @property
     def taken(self) -> np.ndarray:
@@ -73,14 +79,16 @@ class Specular:
 
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
-        meta = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
+        meta: dict[str, Any] = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
+        meta["sun"] = self.sun and self.sun.as_lists()
         return {"specular": self.specular, "excess": self.excess, "hidden": self.hidden}, meta
 
     @staticmethod
     def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
         """From the stage's arrays, and the descriptions as JSON has them."""
         materials = tuple(from_json(entry) for entry in meta["materials"])
-        return Specular(materials, arrays["specular"], arrays["excess"], arrays["hidden"])
+        sun = meta["sun"] and Sun.from_lists(meta["sun"])
+        return Specular(materials, arrays["specular"], arrays["excess"], arrays["hidden"], sun)
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,30 @@ def fit_specular(
             emitted, seen_elements, room.irradiance[seen_elements], threads=settings.threads, seed=settings.seed,
             progress=room.progress, share=(0.85, 1.0), without=without,
         )  # fmt: skip
-    return Specular(materials, specular, excess, hidden)
+    if held is not None:
+        return Specular(materials, specular, excess, hidden, held.found.sun)
+    found = Specular(materials, specular, excess, hidden)
+    return _under_sun(found, room) if refine and "sun-strength" not in without else found
+
+
+def _under_sun(found: Specular, room: Room) -> Specular:
+    """The same with the irradiance that L_d less its specular part asks of a sun that was solved for."""
+    field, lit_diffuse, settings = room.field, room.lit_diffuse, room.settings
+    before = field.sun
+    if before is None or before.seen:
+        return found
+    diffuse_objects = [m.object_id for m in found.materials if m.model.has_diffuse and not m.model.gives_light]
+    good = lit_diffuse.seen & ~found.hidden & np.isin(field.atlas.object_id, diffuse_objects)
+    elements = np.arange(len(field.atlas))
+    sunlight = sun_irradiance(field, elements, room.irradiance.mean(1), settings.threads, settings.seed)
+    sun = strength_without_gloss(
+        field, lit_diffuse.radiance - found.specular, room.irradiance + found.excess - sunlight, good,
+        lit_diffuse.clipped > 0.5, settings.seed,
+    )  # fmt: skip
+    if sun is None:
+        return found
+    stronger = sun.irradiance / np.maximum(before.irradiance, 1e-12) - 1
+    return replace(found, excess=found.excess + sunlight * stronger.astype(np.float32), sun=sun)
 
 
 def look_at_block(room: Room, block: tuple[int, int]) -> dict[int, Looked]:

@@ -87,7 +87,7 @@ def _pattern_search(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np
     return guess
 
 
-def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Elements of the `pool` that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
     directions = (direction, *ring(direction, ASTRAY), *ring(direction, ASTRAY / 2, 4))
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
@@ -98,7 +98,7 @@ def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng
 
 @dataclass(frozen=True)
 class SolvedSun:
-    """A sun, the sample that it was found with, and its edges, with the differences across them without and with it.
+    """A sun, the sample that it was found with, and its edges.
 
     Attributes
     ----------
@@ -108,8 +108,6 @@ class SolvedSun:
     sun: Sun
     _even: Spots
     _edges: Edges
-    _before: float
-    _after: float
 
     def under(self, factor: np.ndarray) -> Sun:
         """The sun again, all other light having changed by factors ((m, 3)) at the sample that it was found with."""
@@ -117,7 +115,7 @@ class SolvedSun:
         _, nearest = cKDTree(self._even.place).query(spots.place)
         spots.sample = replace(spots.sample, received=spots.sample.received * factor[nearest])
         strengths = self._edges.strengths(self.sun.direction)
-        return _coloured(strengths, self.sun.direction, self.sun.radius, self._before, self._after)
+        return replace(self.sun, irradiance=of_luminance(strengths))
 
 
 def find_sun(
@@ -163,7 +161,7 @@ def find_sun(
     sample = np.sort(rng.choice(pool, min(len(pool), SUN.even), replace=False))
     wide = Edges(spots(sample, np.ones((len(sample), 3))))
     for guess in _candidates(even, wide):
-        beside = _along_edges(field, pool, guess.direction, rng)
+        beside = along_edges(field, pool, guess.direction, rng)
         if len(beside) < LEVELS.few:
             continue
         edges = Edges(spots(beside, irradiance(beside)))
@@ -175,9 +173,9 @@ def find_sun(
         strengths = edges.strengths(fit.direction)
         # Paper in reach of a window differs across the edge of such a patch, but its own edges lie elsewhere.
         alike = fit.cost < (1 - SUN.along) * edges.without_sun()
-        if alike and after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and _is_sunlike(strengths):
-            sun = _coloured(strengths, fit.direction, fit.radius, before, after)
-            return SolvedSun(sun, even, edges, before, after)
+        if alike and after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and is_sunlike(strengths):
+            direction = np.asarray(fit.direction, np.float32)
+            return SolvedSun(Sun(direction, of_luminance(strengths), fit.radius, edges=(before, after)), even, edges)
     return None
 
 
@@ -196,7 +194,7 @@ def _fit(edges: Edges, direction: np.ndarray) -> Guess:
     return fit
 
 
-def _is_sunlike(strengths: np.ndarray) -> bool:
+def is_sunlike(strengths: np.ndarray) -> bool:
     """Whether no channel is brighter than a sun's can be: in what copper shades throw onto a table red is.
 
     A channel that is too dark says nothing, as errors of the other light weigh most in it: a bedroom's true sun had .63
@@ -206,18 +204,8 @@ def _is_sunlike(strengths: np.ndarray) -> bool:
     return bool((np.array(channels) <= luminance * SUN.colour).all())
 
 
-def _of_luminance(strengths: np.ndarray) -> np.ndarray:
+def of_luminance(strengths: np.ndarray) -> np.ndarray:
     """A sun's irradiance ((3,) float32) by what each channel says of it, held near the luminance, which comes last."""
     *channels, luminance = strengths
     limited = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
     return (limited * (luminance / max(float(limited @ LUMINANCE), 1e-12))).astype(np.float32)
-
-
-def _coloured(strengths: np.ndarray, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
-    """The sun with what each channel says of its irradiance, held near the luminance's."""
-    sun = Sun(np.asarray(direction, np.float32), _of_luminance(strengths), radius)
-    note = (
-        f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
-        f"(differences of log albedo across its edges {before:.3f} to {after:.3f})."
-    )
-    return replace(sun, note=note)
