@@ -43,7 +43,7 @@ def interval_coverage(recovery: Recovery, held_out: list[dict], truth: dict[int,
     in_interval = [
         m.roughness_low <= np.sqrt(truth[i]["alpha"]) <= m.roughness_high
         for i, m in materials.items()
-        if m.model.has_lobe and m.roughness_low is not None and truth[i]["alpha"] is not None
+        if i in truth and m.model.has_lobe and m.roughness_low is not None and truth[i]["alpha"] is not None
     ]
 
     def share(chosen: np.ndarray) -> float:

@@ -176,7 +176,9 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
         # A broad lobe of a dielectric can look like a weak metal's: it must be distinguished from that, too.
         metal_gain, metal_sigmas = _gain_of_metal(with_metal, diffuse)
         gain_over_dielectric, sigmas_over_dielectric = _gain_of_metal(with_metal, with_lobe)
-        bare_cost = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
+        # What mirrors much costs more by errors of what it mirrors: the more it takes off a dielectric's cost, the less
+        # may this one decide.
+        bare_cost = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum() * (1 - gain_over_dielectric)
         if min(metal_gain, gain_over_dielectric) > CHOICE.min_gain and bare_cost <= CHOICE.bare * diffuse.sum():
             if metal_sigmas > LEVELS.sigmas and sigmas_over_dielectric > LEVELS.likely:
                 alternative = dielectric if sure and sigmas_over_dielectric < LEVELS.sigmas else None
