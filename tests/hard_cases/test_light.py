@@ -286,10 +286,11 @@ def test_sun_that_no_frame_sees(capture, expect):
     expect("albedo of the floor in the sun", off_in_patch(run), 0.15)
     with Store(run.folder) as store:
         again = Recovery(read_capture(taken.root), store, SUNNY, Progress(), taken.unwrap)
-        kept = again.shading().sun
-        assert again.log["shading"]["stored"]
+        kept, again_sun = again.shading().sun, again.sun
+        assert again.log["shading"]["stored"] and again.log["specular"]["stored"]
     assert (kept.direction == sun.direction).all() and (kept.irradiance == sun.irradiance).all()
     assert (kept.radius, kept.seen, kept.note) == (sun.radius, sun.seen, sun.note)
+    assert run.report["figures"]["sun"]["irradiance"] == again_sun.irradiance.tolist()
     assert run.report["figures"]["sun"]["seen"] is False
 
 

@@ -155,7 +155,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
     }
     if shading.openings is not None:
         figures["unknown_light_share"] = float(shading.openings.share)
-    sun = run.sun
+    sun = run.sun if "specular" in run.done else shading.sun
     if sun is not None:
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip

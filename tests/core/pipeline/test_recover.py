@@ -76,6 +76,14 @@ def test_albedo_lamp_and_report(disk, finished):
     assert [o["model"] for o in objects] == [m.model.name for m in run.materials]
 
 
+def test_a_report_of_what_is_done_asks_for_no_further_stage(disk, tmp_path):
+    with Store(tmp_path / "result") as store:
+        run = Recovery(read_capture(disk.root), store, CHEAP, Progress(), disk.unwrap)
+        run.shading()
+        assert run.report()["figures"]["lamps"] == [6]
+        assert "specular" not in run.done
+
+
 def test_a_second_run_computes_nothing(disk, finished):
     folder, first = finished
 
