@@ -13,8 +13,8 @@ class SunParams:
     ----------
     gain : float
         Share by which the differences of log albedo between neighbours on two sides of the patch's edge must fall. With
-        a sun five rooms gain .36 to .54 and a kitchen as a phone shows it .23; other directions, and twelve rooms
-        without one, up to .1.
+        a sun five rooms gain .36 to .54 and two as a phone shows them .23 and .14 to .21 (half of what lies
+        along its edges is clipped); other directions, and twelve rooms without one, up to .1.
     along : float
         The same of all neighbours along the edge, also those on one side of it: suns .37 and .42, a sheet of paper .01,
         the pool of a spotlight less than none.
@@ -41,7 +41,7 @@ class SunParams:
         So may be those whose log albedo is so far above their object's median (2.7 times).
     """
 
-    gain: float = 0.15
+    gain: float = 0.12
     along: float = 0.05
     reached: float = 0.05
     kept: int = 160

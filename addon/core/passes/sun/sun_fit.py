@@ -34,7 +34,7 @@ SOFT = np.radians([0.8, 0.4, 0.2])
 
 def _candidates(even: Spots, wide: Edges) -> list[Guess]:
     """Directions that may be the sun's, the best first: of those that reach what stands out on the `even` sample."""
-    directions = _reaching_most(even, np.flatnonzero(even.stands_out()))
+    directions = _reaching_most(even, even.stands_out())
     guesses = list(ordered_map(wide.contrast, directions, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
     refined = ordered_map(lambda guess: _within_cell(wide.contrast, guess), _distinct(guesses)[: SUN.refined], 0)
@@ -48,19 +48,25 @@ def _within_cell(cost: Callable[[np.ndarray], Guess], guess: Guess) -> Guess:
     return _pattern_search(cost, best, SHARP)
 
 
-def _reaching_most(spots: Spots, index: np.ndarray) -> np.ndarray:
-    """Directions above the horizon, of the grid, that reach most of the spots at `index` ((k,) int), (d, 3) float32.
+def _reaching_most(spots: Spots, chosen: np.ndarray) -> np.ndarray:
+    """Directions above the horizon, of the grid, that reach more of the spots `chosen` ((m,) bool) than of the others.
 
-    Also where frames show a sky without a sun: a renderer's is seen by no camera, and what it lights tells enough.
+    (d, 3) float32, the best first. By a wide opening many directions reach all alike. Also where frames show a sky
+    without a sun: a renderer's is seen by no camera, and what it lights tells enough.
     """
     directions = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
     directions = directions[directions[:, 2] > 0]
-    spot, ray = np.nonzero(spots.normal[index] @ directions.T > 0)
-    origin = spots.scene.off_surface(spots.position[index], spots.normal[index])
-    occluded = spots.scene.occluded(origin[spot], directions[ray], np.full(len(spot), np.inf, np.float32))
-    reached = np.bincount(ray[~occluded], minlength=len(directions)) / len(index)
-    best = np.argsort(-reached, kind="stable")[: SUN.kept]
-    return directions[best[reached[best] > SUN.reached]]
+
+    def reached(index: np.ndarray) -> np.ndarray:
+        spot, ray = np.nonzero(spots.normal[index] @ directions.T > 0)
+        origin = spots.scene.off_surface(spots.position[index], spots.normal[index])
+        occluded = spots.scene.occluded(origin[spot], directions[ray], np.full(len(spot), np.inf, np.float32))
+        return np.bincount(ray[~occluded], minlength=len(directions)) / max(len(index), 1)
+
+    of_chosen, others = reached(np.flatnonzero(chosen)), np.flatnonzero(~chosen)
+    some = np.random.default_rng(0).choice(others, min(len(others), int(chosen.sum())), replace=False)
+    best = np.argsort(reached(some) - of_chosen, kind="stable")[: SUN.kept]
+    return directions[best[of_chosen[best] > SUN.reached]]
 
 
 def _distinct(guesses: list[Guess]) -> list[Guess]:
@@ -87,13 +93,12 @@ def _pattern_search(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np
     return guess
 
 
-def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Elements of the `pool` that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
     directions = (direction, *ring(direction, ASTRAY), *ring(direction, ASTRAY / 2, 4))
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
     lit = np.stack([visible(field.scene, sun, position, normal) > 0.1 for sun in directions])
-    mixed = pool[lit.any(0) & ~lit.all(0)]
-    return np.sort(rng.choice(mixed, min(len(mixed), SUN.dense), replace=False))
+    return pool[lit.any(0) & ~lit.all(0)]
 
 
 @dataclass(frozen=True)
@@ -161,7 +166,8 @@ def find_sun(
     sample = np.sort(rng.choice(pool, min(len(pool), SUN.even), replace=False))
     wide = Edges(spots(sample, np.ones((len(sample), 3))))
     for guess in _candidates(even, wide):
-        beside = along_edges(field, pool, guess.direction, rng)
+        beside = along_edges(field, pool, guess.direction)
+        beside = np.sort(rng.choice(beside, min(len(beside), SUN.dense), replace=False))
         if len(beside) < LEVELS.few:
             continue
         edges = Edges(spots(beside, irradiance(beside)))

@@ -40,7 +40,7 @@ def strength_without_gloss(
     rng = np.random.default_rng([seed, 5])
     pool = np.flatnonzero(good)
     pool = np.sort(rng.choice(pool, min(len(pool), SAMPLES.in_all), replace=False))
-    beside = along_edges(field, pool, sun.direction, rng)
+    beside = along_edges(field, pool, sun.direction)
     if len(beside) < LEVELS.few:
         return None
     spots = Spots(field.with_light(diffuse), beside, irradiance[beside].astype(np.float64), object_id, clipped)

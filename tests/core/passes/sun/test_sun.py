@@ -10,11 +10,12 @@ import pytest
 
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
+from addon.core.light.field import LightField
 from addon.core.light.over_surface import sun_irradiance
 from addon.core.light.sun import RADIUS, Sun, extract_sun, insert_sun, sunlight
 from addon.core.luminance import LUMINANCE
-from addon.core.passes.sun.sun_fit import _within_cell, find_sun
-from addon.core.passes.sun.sun_spots import Guess, ring
+from addon.core.passes.sun.sun_fit import GRID, _reaching_most, _within_cell, find_sun
+from addon.core.passes.sun.sun_spots import Guess, Spots, ring
 from addon.core.passes.sun.sun_strength import strength_without_gloss
 from addon.core.pipeline.shading import lit_room, shade
 from addon.core.scene.lit_diffuse import LitDiffuse
@@ -67,6 +68,17 @@ def test_bars_of_a_window_do_not_hold_the_search(side):
         return Guess(direction, -max(1 - there / 1.2, 0.6 - here / 4, 0))
 
     assert angle(_within_cell(cost, cost(beside)).direction, sun) < 0.6
+
+
+def test_a_wide_opening_does_not_hide_the_window_of_the_sun():
+    """By it many directions reach all that stands out, of which the sun's patch is a part."""
+    walls = [q for q in sunny.sides()[0] if q.corner[0] or q.edge_u[0] or q.edge_v[0]]
+    room = make_room(walls, 0.05)
+    patch = sunny.sun_on(room) > 0.5 * sunny.TOWARDS[2]
+    chosen = patch | (np.random.default_rng(0).random(len(patch)) < 2 * patch.mean())
+    field = LightField(room.mesh, room.atlas, room.scene, np.ones((len(patch), 3), np.float32), Environment.dark())
+    spots = Spots(field, np.arange(len(patch)), np.ones((len(patch), 3)), room.atlas.object_id, np.zeros(len(patch)))
+    assert min(angle(d, sunny.TOWARDS) for d in _reaching_most(spots, chosen)) < np.degrees(GRID)
 
 
 def test_a_sun_that_no_frame_sees_is_found_by_its_patch(room):
