@@ -166,7 +166,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     gain, sigmas = _gain(with_lobe, without)
     large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
     enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
-    sure = enough and fit.phi <= FIT.broadest_phi
+    sure = enough and (fit.phi <= FIT.broadest_phi or (large and sigmas > LEVELS.sigmas))
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MAX_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None

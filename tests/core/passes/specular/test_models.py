@@ -60,6 +60,17 @@ def test_a_part_needs_less_evidence_and_is_never_metal(seen):
     assert choose_model(seen["metal"], part=True).model != METAL
 
 
+def test_a_broad_lobe_has_to_gain_much():
+    """Over dark wood it is most of what is seen; over white paint a diffuse surface is as likely."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    wood, white = (
+        choose_model(box.problem(element, direction, 0.6, 0.04, share * paint(element))) for share in (0.1, 1.5)
+    )
+    assert (wood.model, white.model) == (DIELECTRIC, LAMBERTIAN)
+    assert wood.fit.phi > 0.5 and wood.gain > 0.1 > white.gain
+
+
 def test_a_metals_colour(seen):
     assert np.allclose(metal_f0(seen["metal"], 0.11), COPPER, rtol=0.05)
 
