@@ -166,7 +166,9 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     gain, sigmas = _gain(with_lobe, without)
     large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
     enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
-    sure = enough and (fit.phi <= FIT.broadest_phi or (large and sigmas > LEVELS.sigmas))
+    # At the grid's end a still broader one might do as well.
+    identifiable = large and sigmas > LEVELS.sigmas and fit.phi < dense.grid[-1]
+    sure = enough and (fit.phi <= FIT.broadest_phi or identifiable)
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MAX_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
