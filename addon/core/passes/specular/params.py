@@ -25,7 +25,7 @@ class FitParams:
     broadest_phi : float
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface, but for one
         over a diffuse part that takes `LEVELS.gain` off the cost by `LEVELS.sigmas`: in nine rooms three varnished
-        things, one a table with .61 (29 standard errors), and nothing diffuse (.09 by 1.9, .05 by 3.3).
+        things, one a table with .61 (29 standard errors), and nothing diffuse (.12 by .4, .09 by 1.9, .05 by 3.3).
     crease : float
         Radians by which two faces must turn for an edge between them (`pixel-curvature`); Blender's own for smooth
         shading.
