@@ -120,7 +120,8 @@ def close_holes(
     read : callable
         Gives a frame's pixels, none of them valid where it is damaged; called where frames look out of the mesh.
     """
-    grids = plane_grids(vertices, triangles, parts.planes)
+    viewpoints = np.stack([frame.camera.camera_to_world[:3, 3] for frame in frames])
+    grids = plane_grids(vertices, triangles, parts.planes, viewpoints)
     new_part, names = len(parts.names), dict(parts.names)
     corner, face, part, first = [np.zeros((0, 3))], [np.zeros((0, 3), int)], [np.zeros(0, int)], 0
     for grid, (closed, seen) in zip(grids, _cells_to_close(vertices, triangles, grids, frames, read), strict=True):
@@ -239,11 +240,13 @@ def _outside(sight: Sight, group: np.ndarray, beyond: RadianceBeyond, gap: float
     return outside[group]
 
 
-def plane_grids(vertices: np.ndarray, triangles: np.ndarray, planes: Sequence[Plane]) -> list[PlaneGrid]:
-    """The large planes of a mesh, each with the cells that it may be continued over."""
+def plane_grids(
+    vertices: np.ndarray, triangles: np.ndarray, planes: Sequence[Plane], viewpoints: np.ndarray
+) -> list[PlaneGrid]:
+    """The large planes of a mesh that was seen from (f, 3) viewpoints, each with the cells that it may go on over."""
     gap = plane_gap(vertices[triangles.ravel()])
     corners = vertices[triangles]
-    outer = outermost(corners, planes, gap)
+    outer = outermost(corners, planes, gap, viewpoints)
     inner = [plane for plane in planes if not any(_coincide(plane, outer_plane, gap) for outer_plane in outer)]
     extent = np.concatenate(
         [corners[plane.faces].reshape(-1, 3) for plane in outer if len(plane.faces)] or [corners[0]]
@@ -279,16 +282,22 @@ def _coincide(a: Plane, b: Plane, gap: float) -> bool:
     return bool(a.normal @ b.normal > np.cos(PARTS.tilt) and abs((a.point - b.point) @ b.normal) < gap)
 
 
-def outermost(corners: np.ndarray, planes: Sequence[Plane], gap: float) -> list[Plane]:
+def outermost(corners: np.ndarray, planes: Sequence[Plane], gap: float, viewpoints: np.ndarray) -> list[Plane]:
     """The planes that bound a room, one for each direction; its one wall that nobody saw, if all others are there.
 
     Parameters
     ----------
     corners : (t, 3, 3) float64
         Of the mesh's triangles.
+    viewpoints : (f, 3) float64
+        Where frames were taken from. What has more than a few of them behind it would hang in the midst of the room.
     """
     bounds: list[Plane] = []
-    named = [plane for plane in planes if plane.name]
+    named = [
+        plane
+        for plane in planes
+        if plane.name and np.mean((viewpoints - plane.point) @ plane.normal > 0) >= PARTS.outer
+    ]
     for plane in sorted(named, key=lambda plane: float(plane.point @ plane.normal)):
         if all(plane.normal @ other.normal < np.cos(PARTS.tilt) for other in bounds):
             bounds.append(
@@ -303,8 +312,8 @@ def outermost(corners: np.ndarray, planes: Sequence[Plane], gap: float) -> list[
     if len(level) == 2 and len(walls) > 2 and len(alone) == 1:
         normal = -alone[0].normal
         points = corners[np.concatenate([plane.faces for plane in level])].reshape(-1, 3)
-        point = points[(points @ normal).argmin()]
-        bounds.append(Plane(normal, point, np.zeros(0, int), name="wall"))
+        depth = min((points @ normal).min(), np.quantile(viewpoints @ normal, 1 - PARTS.outer))
+        bounds.append(Plane(normal, depth * normal, np.zeros(0, int), name="wall"))
     return bounds
 
 

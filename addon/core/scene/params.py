@@ -264,7 +264,7 @@ class PartsParams:
     concave : float
         Radians of the mean bend from which on an edge parts two things.
     outer : float
-        Share of the surface in front of a floor, a ceiling, a wall.
+        Share of the surface, and of the viewpoints, in front of a floor, a ceiling, a wall.
     """
 
     rounds: int = 8

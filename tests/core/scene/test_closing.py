@@ -260,3 +260,21 @@ def test_crumbs_of_a_floor_lie_flat_over_what_closes_it(edge, kept):
     spread = [np.ptp(points[own, 2] - 0.01 * points[own, 0]) for points in (moved, mesh.vertices)]
     assert spread[0] == spread[1] if kept else spread[0] < 0.3 * spread[1]
     assert np.array_equal(moved[vase], mesh.vertices[vase])
+
+
+def test_what_cameras_stand_behind_is_no_wall_of_the_room():
+    """The side of a cupboard, in a room whose far end was not fused: no curtain hangs beside it."""
+    vertices, triangles = room(lambda centre, side: (side == 1) | (centre[:, 0] > 2.1))
+    y, z = np.meshgrid(np.linspace(1.5, 2.3, 9), np.linspace(0.1, 1.7, 17), indexing="ij")
+    board = np.stack([np.full(y.shape, 1.8), y, z], -1).reshape(-1, 3)
+    corner = np.arange(len(board)).reshape(y.shape)
+    a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
+    facing = np.concatenate([np.stack([a, c, b], 1), np.stack([a, d, c], 1)])
+    mesh = np.concatenate([vertices, board]), np.concatenate([triangles, facing + len(vertices)])
+    (plane,) = (plane for plane in parts_of(*mesh).planes if plane.name == "wall" and plane.normal[0] < -0.9)
+    assert plane.point[0] == pytest.approx(1.8, abs=0.01)
+    added = closing(mesh)
+    a, b, c = (added.vertices[corner] for corner in added.triangles.T)
+    normal = np.cross(b - a, c - a)
+    upright = np.abs(normal[:, 0]) > 0.9 * np.linalg.norm(normal, axis=1)
+    assert (a[upright, 0] > 2.5).any() and not ((a[upright, 0] > 0.1) & (a[upright, 0] < 2.5)).any()
