@@ -105,21 +105,28 @@ class Grower:
         return seeds[np.argsort(-self.area[seeds], kind="stable")]
 
     def grow(self, seed: int) -> np.ndarray:
-        """The triangles around `seed` that may lie in one plane with it; those of other sheets are not free.
+        """The triangles around `seed` that lie in one plane with it; those of other sheets are not free.
 
-        The noise allows for a scan's smooth error. Where a region shows that it has less, what lies farther off than
-        that is no part of it: a picture hung on a wall, which it reached by a few triangles of its edge.
+        A small region is tilted as it meets a step, and grows over it: what then lies farther off than the rest is left
+        out again, as a picture on a wall.
         """
-        region, mean, normal = self._within(seed, self.noise)
-        distance = np.abs((self.points[np.unique(self.faces[region])] - mean) @ normal)
-        spread = max(SIGMA_OF_MAD * float(np.median(distance)), self.noise / PLANES.reach)
-        if spread < self.noise and distance.max() > PLANES.reach * spread:
-            region, _, _ = self._within(seed, spread)
-        self.tried[region] = True
-        return region
+        region = self._reached(seed)
+        corner, near = self.faces[region], np.ones(len(region), bool)
+        for _ in range(LEVELS.reweighted):
+            moments = Moments(self.points[corner[0, 0]])
+            moments.add(self.points[np.unique(corner[near])])
+            mean, axes, _ = moments.plane()
+            distance = np.abs((self.points[corner] - mean) @ axes[0])
+            spread = SIGMA_OF_MAD * float(np.median(distance))
+            closer = (distance <= np.clip(PLANES.reach * spread, self.noise, PLANES.reach * self.noise)).all(1)
+            if not closer.any() or (closer == near).all():
+                break
+            near = closer
+        self.tried[region[near]] = True
+        return region[near]
 
-    def _within(self, seed: int, spread: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Region of points that lie off its plane by `spread` (root mean square, metres), and its mean and normal."""
+    def _reached(self, seed: int) -> np.ndarray:
+        """The triangles that a region reaches that grows from `seed`, (f,) int."""
         self._run += 1
         self._seen[seed] = self._run
         facing, count = self.normal[seed], 0
@@ -142,11 +149,10 @@ class Grower:
             adjacent, first = np.unique(adjacent[fit], return_index=True)
             arm = (self.points[self.faces[adjacent]] - mean) @ axes.T
             variance = 1 + 1 / count + arm[..., 1] ** 2 / scatter[1] + arm[..., 2] ** 2 / scatter[2]
-            fits = (arm[..., 0] ** 2 < (PLANES.reach * spread) ** 2 * variance).all(1)
+            fits = (arm[..., 0] ** 2 < (PLANES.reach * self.noise) ** 2 * variance).all(1)
             front, sign = adjacent[fits], winding[fit][first][fits]
             self._seen[front] = self._run
-        mean, axes, _ = moments.plane()
-        return np.concatenate(region), mean, axes[0]
+        return np.concatenate(region)
 
     def outline(self, region: np.ndarray) -> float:
         """Length of a region's outline in metres."""
