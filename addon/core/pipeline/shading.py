@@ -68,7 +68,8 @@ def find_shading(
         )  # fmt: skip
     patches, parts_guessed, whole = Patches.none(), capture.mesh.whole, surface.atlas.object_id
     cameras = [frame.camera for frame in capture.frames]
-    if parts_guessed and not {"clipped-patches", "missing-light"} & set(s.without):
+    set_apart = parts_guessed and not {"clipped-patches", "missing-light"} & set(s.without)
+    if set_apart:
         patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit_diffuse)
         surface = patches.surface(surface)
     if parts_guessed and s.mirrors and "mirrors" not in s.without:
@@ -94,7 +95,8 @@ def find_shading(
             patches=patches.lamps if parts_guessed else None, whole=whole, cameras=cameras,
         )  # fmt: skip
 
-    if "clipped-lamps" in s.without:
+    # What else is clipped where patches were set apart is lit, as a sofa in the sun is, and would be shaded in vain.
+    if set_apart or "clipped-lamps" in s.without:
         shading = shaded(lit_diffuse)
     else:
         shading = shade_clipped(shaded, lit_diffuse, surface.atlas, patches.lamps)

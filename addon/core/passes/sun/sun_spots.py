@@ -202,7 +202,8 @@ class Edges:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
         Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
-        median share of what is not clipped. Where nearly all is, their lower bound; 0 if unknown.
+        median share of what is not clipped, and the same where that is too little. Where all is, the median bound; 0 if
+        unknown.
         """
         spots = self.spots
         contribution = spots.contribution(direction)
@@ -217,10 +218,12 @@ class Edges:
 
         luminance = needed(LUMINANCE)
         unclipped = ~clipped & (luminance > 0)
-        if unclipped.sum() < LEVELS.few:
+        if not unclipped.any():
             return np.full(4, max(np.median(luminance), 0))
         survival = ecdf(CensoredData.right_censored(luminance, clipped)).sf
         half = np.flatnonzero(survival.probabilities <= 0.5)
         strength = survival.quantiles[half[0]] if len(half) else luminance[unclipped].max()
+        if unclipped.sum() < LEVELS.few:
+            return np.full(4, strength)
         shares = [np.median(needed(channel)[unclipped] / luminance[unclipped]) for channel in np.eye(3)]
         return np.maximum(strength * np.array([*shares, 1]), 0)
