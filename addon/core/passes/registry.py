@@ -79,6 +79,7 @@ PASSES = (
         whole_sky="Solves for the sky where no frame sees any of it.",
         missing_light="Solves for clipped patches, and for what comes in by openings, where albedos are above 1.",
         sun="Solves for a sun that no frame sees from the patch of light that it makes.",
+        clipped_sunlight="Lets a patch of sun that frames clip send what the albedo around it makes of the sun.",
         seen_sun="Takes a sun that frames see out of the environment map and treats it by itself.",
         material_parts="Sets apart connected pieces of an object that look unlike the rest of it.",
         mirrors="Finds flat mirrors and follows light over them.",

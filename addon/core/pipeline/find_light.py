@@ -15,6 +15,7 @@ from ..light.sun import Sun
 from ..luminance import LUMINANCE
 from ..passes.clipped_lamps.patches import measured_patches
 from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
+from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
@@ -179,9 +180,17 @@ def with_missing_light(
     )  # fmt: skip
     if solved is None:
         return lit_field, light_found, missing.shut
-    dark, reflecting = dark.with_sun(solved.sun), reflecting.with_sun(solved.sun)
+    clipped, before = lit_diffuse.seen & (lit_diffuse.clipped > 0.5), irradiance_by_all(element)
+    radiance, dark = dark.radiance, dark.with_sun(solved.sun)
+    if "clipped-sunlight" not in without:
+        dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, before, whole))
+        unknown = np.setdiff1d(unknown, dark.atlas.object_id[(dark.radiance > radiance).any(1)]).tolist()
+        reliable = reliable & ~clipped
+    reflecting = reflecting.with_sun(solved.sun).with_light(dark.radiance)
     missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
-    return *with_found_light(dark, field, light, lit_diffuse, missing, measured), missing.shut
+    lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
+    under_others = irradiance_at(lit_field.with_sun(None), element, seed)
+    return lit_field.with_sun(solved.under(under_others / np.maximum(before, 1e-12))), light_found, missing.shut
 
 
 def with_found_light(

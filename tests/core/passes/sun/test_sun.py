@@ -14,6 +14,7 @@ from addon.core.light.field import LightField
 from addon.core.light.over_surface import sun_irradiance
 from addon.core.light.sun import RADIUS, Sun, extract_sun, insert_sun, sunlight
 from addon.core.luminance import LUMINANCE
+from addon.core.passes.sun.clipped_sunlight import with_clipped_sunlight
 from addon.core.passes.sun.sun_fit import GRID, _reaching_most, _within_cell, find_sun
 from addon.core.passes.sun.sun_spots import Guess, Spots, ring
 from addon.core.passes.sun.sun_strength import strength_without_gloss
@@ -330,3 +331,23 @@ def test_without_a_sun_what_is_clipped_is_none(room):
     lit = measured(room, sunny.light(room, sun=np.zeros(3)), texture=0.3)
     level = float(np.quantile(lit.radiance.max(1), 0.95))
     assert sun_by(room, clipped_at(lit, level)) is None
+
+
+def test_a_clipped_patch_sends_what_it_reflects_of_the_sun(room):
+    """Its level is a fifth of what it sends: so much less than it does it would light the room."""
+    true = sunny.light(room)
+    E = np.pi * true / room.by_object(sunny.ALBEDO)
+    sun_E = sunny.sun_on(room)[:, None] * sunny.SUN
+    patch = (sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]) & (room.atlas.object_id == 0)
+    level = 0.2 * float(np.median(true[patch].max(1)))
+    lit = clipped_at(measured(room, true, noise=0, texture=0), level)
+    clipped, element = lit.clipped > 0.5, np.arange(0, len(true), 3)
+    field = LightField(room.mesh, room.atlas, room.scene, lit.radiance, Environment.dark())
+    field = field.with_sun(Sun(np.float32(sunny.TOWARDS), np.float32(sunny.SUN), sunny.RADIUS))
+    found = with_clipped_sunlight(field, clipped, element, (E - sun_E)[element], room.atlas.object_id)
+    assert clipped[patch].all() and np.median(lit.radiance[patch] / true[patch]) < 0.4
+    assert np.allclose(np.median(found[patch] / true[patch], 0), 1, atol=0.15)
+    assert np.array_equal(found[~clipped], lit.radiance[~clipped]) and (found >= lit.radiance).all()
+    element = element[room.atlas.object_id[element] != 0]  # nothing tells the floor's albedo
+    bound = with_clipped_sunlight(field, clipped, element, (E - sun_E)[element], room.atlas.object_id)
+    assert np.array_equal(bound[patch], lit.radiance[patch])
