@@ -174,23 +174,20 @@ def with_missing_light(
         return lit_field, light_found, missing.shut
     element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
     irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
-    solved = find_sun(
-        dark, element, irradiance_by_all(element), lit_diffuse.seen, irradiance_by_all, whole,
-        lit_diffuse.clipped > 0.5, seed,
-    )  # fmt: skip
+    received, clipped = irradiance_by_all(element), lit_diffuse.seen & (lit_diffuse.clipped > 0.5)
+    solved = find_sun(dark, element, received, lit_diffuse.seen, irradiance_by_all, whole, clipped, seed)
     if solved is None:
         return lit_field, light_found, missing.shut
-    clipped, before = lit_diffuse.seen & (lit_diffuse.clipped > 0.5), irradiance_by_all(element)
     radiance, dark = dark.radiance, dark.with_sun(solved.sun)
     if "clipped-sunlight" not in without:
-        dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, before, whole))
+        dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, received, whole))
         unknown = np.setdiff1d(unknown, dark.atlas.object_id[(dark.radiance > radiance).any(1)]).tolist()
         reliable = reliable & ~clipped
     reflecting = reflecting.with_sun(solved.sun).with_light(dark.radiance)
     missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
     lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
     under_others = irradiance_at(lit_field.with_sun(None), element, seed)
-    return lit_field.with_sun(solved.under(under_others / np.maximum(before, 1e-12))), light_found, missing.shut
+    return lit_field.with_sun(solved.under(under_others / np.maximum(received, 1e-12))), light_found, missing.shut
 
 
 def with_found_light(

@@ -95,11 +95,12 @@ def find_shading(
             patches=patches.lamps if parts_guessed else None, whole=whole, cameras=cameras,
         )  # fmt: skip
 
-    # What else is clipped where patches were set apart is lit, as a sofa in the sun is, and would be shaded in vain.
-    if set_apart or "clipped-lamps" in s.without:
+    if "clipped-lamps" in s.without:
         shading = shaded(lit_diffuse)
     else:
-        shading = shade_clipped(shaded, lit_diffuse, surface.atlas, patches.lamps)
+        # What else is clipped where patches were set apart is lit, as a sofa in the sun: solving for it is in vain.
+        no_lamps = [instance.object_id for instance in capture.instances] if set_apart else []
+        shading = shade_clipped(shaded, lit_diffuse, surface.atlas, no_lamps)
     sources = shading.emitters | {mirror.object_id for mirror in shading.mirrors}
     groups = unlike_pieces(patches, whole, surface.atlas, lit_diffuse, shading.irradiance, sources)
     return with_patches_of(shading, patches, groups)

@@ -120,7 +120,7 @@ def close_holes(
     read : callable
         Gives a frame's pixels, none of them valid where it is damaged; called where frames look out of the mesh.
     """
-    viewpoints = np.stack([frame.camera.camera_to_world[:3, 3] for frame in frames])
+    viewpoints = np.stack([frame.camera.centre for frame in frames])
     grids = plane_grids(vertices, triangles, parts.planes, viewpoints)
     new_part, names = len(parts.names), dict(parts.names)
     corner, face, part, first = [np.zeros((0, 3))], [np.zeros((0, 3), int)], [np.zeros(0, int)], 0

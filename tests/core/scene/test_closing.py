@@ -13,6 +13,7 @@ from addon.core.scene.closing import close_holes
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
 from addon.core.scene.shape_parts import parts_of
+from tests.core.passes.mesh_denoising.test_denoise import sheet
 
 from .test_shape_parts import AIR, fused
 
@@ -265,12 +266,9 @@ def test_crumbs_of_a_floor_lie_flat_over_what_closes_it(edge, kept):
 def test_what_cameras_stand_behind_is_no_wall_of_the_room():
     """The side of a cupboard, in a room whose far end was not fused: no curtain hangs beside it."""
     vertices, triangles = room(lambda centre, side: (side == 1) | (centre[:, 0] > 2.1))
-    y, z = np.meshgrid(np.linspace(1.5, 2.3, 9), np.linspace(0.1, 1.7, 17), indexing="ij")
-    board = np.stack([np.full(y.shape, 1.8), y, z], -1).reshape(-1, 3)
-    corner = np.arange(len(board)).reshape(y.shape)
-    a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    facing = np.concatenate([np.stack([a, c, b], 1), np.stack([a, d, c], 1)])
-    mesh = np.concatenate([vertices, board]), np.concatenate([triangles, facing + len(vertices)])
+    board = sheet(np.linspace(1.5, 2.3, 9), np.linspace(0.1, 1.7, 17), lambda y, z: np.full(y.shape, 1.8))
+    facing = board.triangles[:, ::-1] + len(vertices)
+    mesh = np.concatenate([vertices, board.vertices[:, [2, 0, 1]]]), np.concatenate([triangles, facing])
     (plane,) = (plane for plane in parts_of(*mesh).planes if plane.name == "wall" and plane.normal[0] < -0.9)
     assert plane.point[0] == pytest.approx(1.8, abs=0.01)
     added = closing(mesh)

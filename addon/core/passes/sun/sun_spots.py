@@ -202,8 +202,7 @@ class Edges:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
         Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
-        median share of what is not clipped, and the same where that is too little. Where all is, the median bound; 0 if
-        unknown.
+        median share of what is not clipped, white if that is too little. Where all is, the median bound; 0 if unknown.
         """
         spots = self.spots
         contribution = spots.contribution(direction)
@@ -223,7 +222,7 @@ class Edges:
         survival = ecdf(CensoredData.right_censored(luminance, clipped)).sf
         half = np.flatnonzero(survival.probabilities <= 0.5)
         strength = survival.quantiles[half[0]] if len(half) else luminance[unclipped].max()
-        if unclipped.sum() < LEVELS.few:
-            return np.full(4, strength)
-        shares = [np.median(needed(channel)[unclipped] / luminance[unclipped]) for channel in np.eye(3)]
+        shares = [1.0] * 3
+        if unclipped.sum() >= LEVELS.few:
+            shares = [np.median(needed(channel)[unclipped] / luminance[unclipped]) for channel in np.eye(3)]
         return np.maximum(strength * np.array([*shares, 1]), 0)

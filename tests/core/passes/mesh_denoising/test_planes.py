@@ -9,7 +9,7 @@ from addon.core.passes.mesh_denoising import denoise
 from addon.core.passes.mesh_denoising.planes import neighbours_of, sheet_of, sheets_of
 from addon.core.scene.model import Mesh
 from addon.core.scene.weld import one_place, welded
-from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, smoothed, sphere, tilted, tube
+from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
 from tests.core.rooms import make_room, quad, split
 
 
@@ -149,23 +149,13 @@ def test_a_bend_is_weighed_against_the_noise():
     assert sheet_of(few, np.arange(1), 0.0036, 0.24, NOISE) is None
 
 
-def wall_with(raised: np.ndarray, height: float, parts: int = 60, size: float = 1.8) -> Mesh:
-    """A square wall of `parts` squares each way, its vertices lifted by `height` metres where `raised` says so."""
-    edge = np.linspace(0, size, parts + 1)
-    x, y = np.meshgrid(edge, edge, indexing="ij")
-    corner = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    vertices = np.stack([x, y, np.where(raised, height, 0)], -1).reshape(-1, 3)
-    return Mesh(vertices, triangles, np.zeros(len(triangles), np.int32))
-
-
 @pytest.mark.parametrize("seed", [0, 2, 3])
 def test_a_picture_before_a_wall_is_not_torn(seed):
     """It hangs four times the noise before it, and is denoised to a fifth of the noise by angles alone."""
     inside = np.zeros((61, 61), bool)
     inside[20:38, 24:37] = True
-    off = noisy(wall_with(inside, 0.02), 0.005, seed=seed)
+    edge = np.linspace(0, 1.8, 61)
+    off = noisy(sheet(edge, edge, lambda u, v: np.where(inside, 0.02, 0)), 0.005, seed=seed)
     found = denoise.denoised(off, 0.005)[:, 2].reshape(61, 61)
     assert np.quantile(np.abs(found[21:37, 25:36] - 0.02), 0.9) < 0.005
     assert np.quantile(np.abs(found[~inside]), 0.99) < 0.005
