@@ -40,12 +40,17 @@ class PatchParams:
     fades : float
         Times a patch's median radiance that what lies around it sends where the patch is lit and no lamp. Five rooms as
         a phone gives them: .15 to .43 around lamps, .7 to 1.25 around what lamps light, .1 to .55 around sunlight.
+    rim : float
+        Of the smallest rim that a patch of its area has, what must have been seen for it to tell whether light fades
+        out: a window lies in a recess, and a few elements of its frame, which it lights, are all that lies beside it.
+        Eight rooms as a phone gives them: at least .4 beside what lamps light, .04 beside such a window.
     """
 
     core: float = 0.9
     bright: float = 40.0
     beside: tuple[float, float] = (4.0, 6.0)
     fades: float = 0.5
+    rim: float = 0.25
 
 
 PATCHES = PatchParams()
@@ -67,7 +72,8 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     if not len(chosen):
         return Patches.none()
     label = np.full(count, -1)
-    label[chosen] = connected(weld(mesh.vertices)[mesh.triangles[chosen]])
+    # A table by a window, both clipped, is of one piece with it in a fused mesh.
+    label[chosen] = connected(weld(mesh.vertices)[mesh.triangles[chosen]], mesh.object_id[chosen].astype(np.int64))
     of_element = label[atlas.triangle]
     inside = (of_element >= 0) & lit.seen
     parts = int(label.max()) + 1
@@ -95,7 +101,8 @@ def _fades(atlas: Atlas, lit: LitDiffuse, patch_of: np.ndarray, patch: int) -> b
     others = others[atlas.normal[others] @ normal > 0.9 * np.linalg.norm(normal)]
     distance, _ = cKDTree(position).query(atlas.position[others], distance_upper_bound=far)
     surround = others[(distance > near) & np.isfinite(distance)]
-    if len(surround) < LEVELS.few:
+    smallest_rim = 2 * np.sqrt(np.pi * len(elements)) * np.ptp(PATCHES.beside)
+    if len(surround) < max(PATCHES.rim * smallest_rim, LEVELS.few):
         return False
     patch_radiance, surround_radiance = (
         float(np.median(lit.radiance[group] @ LUMINANCE)) for group in (elements, surround)

@@ -116,6 +116,32 @@ def test_what_fades_out_is_lit_and_no_patch(far_off):
         assert len(patches_of(room, seen(radiance, clipped.astype(float))).objects) == patches
 
 
+@pytest.mark.parametrize("seen_around", [0.1, 1.0])
+def test_a_few_elements_of_its_frame_do_not_tell_a_window_from_what_is_lit(seen_around):
+    """A pane lights its frame; in a recess frames see little else beside it."""
+    pane = split(quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), 40)
+    beside = around(quad((-0.2, -0.2, 0), (2.4, 0, 0), (0, 2.4, 0), 0), (1 / 12, 11 / 12), (1 / 12, 11 / 12))
+    room = make_room([*pane, *beside], texel=0.02)
+    shown = seen(np.full((len(room.atlas), 3), 0.7, np.float32), np.zeros(len(room.atlas)))
+    in_pane = room.atlas.triangle < 2 * len(pane)
+    shown.radiance[in_pane], shown.clipped[in_pane] = CLIPPED, 1
+    hidden = ~in_pane & (np.abs(room.atlas.position[:, 1] - 1) > seen_around)
+    shown.radiance[hidden], shown.tier[hidden], shown.count[hidden] = np.nan, -1, 0
+    assert len(patches_of(room, shown).objects) == (0 if seen_around == 1 else 1)
+
+
+def test_a_table_by_a_window_is_no_part_of_it():
+    """The mesh is of one piece, and the sensor clips both."""
+    room = make_room(
+        [*split(quad((0, 0, 0), (1, 0, 0), (0, 0, 1), 0), 10), *split(quad((0, 0, 0), (0, 1, 0), (1, 0, 0), 1), 10)],
+        texel=0.02,
+    )
+    shown = seen(np.full((len(room.atlas), 3), CLIPPED, np.float32), np.ones(len(room.atlas)))
+    patches = patches_of(room, shown)
+    assert len(patches.objects) == 2
+    assert len(np.unique(np.stack([patches.object_id, room.mesh.object_id[patches.triangle]]), axis=1).T) == 2
+
+
 def test_an_object_is_clipped_if_most_frames_show_most_of_it_clipped():
     """Whatever a few pixels of its edge say where poses are off; not if half of its frames tell its radiance."""
     room, (_, radiance) = box(), lit()
