@@ -12,7 +12,7 @@ from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
 from addon.core.passes.specular import models
-from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, metal_f0
+from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, gain_of, metal_f0
 from addon.core.passes.specular.one_colour import Coated
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import Box
@@ -69,6 +69,16 @@ def test_a_broad_lobe_has_to_gain_much():
     )
     assert (wood.model, white.model) == (DIELECTRIC, LAMBERTIAN)
     assert wood.fit.phi > 0.5 and wood.gain > 0.1 > white.gain
+
+
+def test_no_lobe_saves_more_than_there_is(seen):
+    """By few rays the noise of a broad lobe is known badly, and may be told to be many times what it is."""
+    problem = seen["glossy"]
+    fit = fit_lobe(problem)
+    for name in ("glossy", "metal"):
+        light = seen[name].light
+        noisy = replace(seen[name], light=replace(light, A_noise=30 * light.A_noise, B_noise=30 * light.B_noise))
+        assert gain_of(replace(fit, psi=np.full(3, 0.3)), noisy)[0] <= 1
 
 
 def test_a_metals_colour(seen):
