@@ -178,16 +178,22 @@ def with_missing_light(
     solved = find_sun(dark, element, received, lit_diffuse.seen, irradiance_by_all, whole, clipped, seed)
     if solved is None:
         return lit_field, light_found, missing.shut
-    radiance, dark = dark.radiance, dark.with_sun(solved.sun)
+    bound, sunlit, dark = dark.radiance, np.zeros(len(clipped), bool), dark.with_sun(solved.sun)
     if "clipped-sunlight" not in without:
         dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, received, whole))
-        unknown = np.setdiff1d(unknown, dark.atlas.object_id[(dark.radiance > radiance).any(1)]).tolist()
+        sunlit = (dark.radiance > bound).any(1)
+        unknown = np.setdiff1d(unknown, dark.atlas.object_id[sunlit]).tolist()
         reliable = reliable & ~clipped
-    reflecting = reflecting.with_sun(solved.sun).with_light(dark.radiance)
-    missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    reflecting = reflecting.with_sun(dark.sun).with_light(dark.radiance)
+    missing = find_missing_light(reflecting, reliable, unknown, seed, windows, sunlit)
+    if sunlit.any():
+        sent = np.maximum(dark.radiance * np.float32(missing.sun), bound)
+        dark = dark.with_sun(solved.times(missing.sun)).with_light(np.where(sunlit[:, None], sent, dark.radiance))
     lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
-    under_others = irradiance_at(lit_field.with_sun(None), element, seed)
-    return lit_field.with_sun(solved.under(under_others / np.maximum(received, 1e-12))), light_found, missing.shut
+    if not sunlit.any():
+        under_others = irradiance_at(lit_field.with_sun(None), element, seed)
+        lit_field = lit_field.with_sun(solved.under(under_others / np.maximum(received, 1e-12)))
+    return lit_field, light_found, missing.shut
 
 
 def with_found_light(

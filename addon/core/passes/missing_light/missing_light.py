@@ -42,6 +42,8 @@ class MissingLight:
         With what was solved for where it is clipped.
     shut : (n,) bool
         Elements of faces that close the mesh and that no frame saw: what they send was solved for like openings.
+    sun : (3,) float64
+        Times the irradiance of the field's sun: the light that it throws asks for that.
     """
 
     lamps: tuple[Lamp, ...]
@@ -50,6 +52,7 @@ class MissingLight:
     openings: Openings
     environment: Environment
     shut: np.ndarray
+    sun: np.ndarray
     notes: tuple[str, ...]
 
 
@@ -63,7 +66,12 @@ def is_missing(field: LightField, good: np.ndarray, seed: int) -> bool:
 
 
 def find_missing_light(
-    field: LightField, good: np.ndarray, patches: list[int], seed: int, windows: np.ndarray | None = None
+    field: LightField,
+    good: np.ndarray,
+    patches: list[int],
+    seed: int,
+    windows: np.ndarray | None = None,
+    sunlit: np.ndarray | None = None,
 ) -> MissingLight:
     """Solve for the light of clipped patches, and of all that is seen through the mesh's openings.
 
@@ -77,16 +85,21 @@ def find_missing_light(
         Objects that were set apart as the sensor clipped them.
     windows : (CELLS,) bool, optional
         `Openings.windows`.
+    sunlit : (n,) bool, optional
+        Elements that send more than frames show, as the field's sun is on them. That is solved for with all the rest.
     """
     atlas, windows = field.atlas, np.zeros(CELLS, bool) if windows is None else windows
     radiance = filled_radiance(field)
     masks = {patch: atlas.object_id == patch for patch in patches}
     bound = {patch: np.median(radiance[mask], 0).astype(np.float64) for patch, mask in masks.items()}
     shut = unseen_closing(field)
-    hidden = np.isin(atlas.object_id, patches) | shut
+    sunlit = np.zeros(len(atlas), bool) if sunlit is None else sunlit
+    hidden = np.isin(atlas.object_id, patches) | shut | sunlit
     element = _sample(field, good & ~hidden, seed)
+    by_sun = _by_sun(field, radiance, sunlit, element, seed)
     radiance[hidden] = 0
-    received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
+    lit_by_known = field.with_openings(None).with_light(radiance, Environment.dark())
+    received = irradiance_at(lit_by_known.with_sun(None) if sunlit.any() else lit_by_known, element, seed)
     sky = field.environment
     part = sky.clipped_parts(MISSING.sky)
     cell, through, from_sky, by_part = _through_cells(field, part, shut, windows, element, seed)
@@ -105,10 +118,13 @@ def find_missing_light(
     bounds = np.reshape(list(bound.values()), (-1, 3))
     patch_bounds = np.reshape([np.median(bounds[w > 0] / w[w > 0, None], 0) for w in lamp_of.T], (-1, 3))
     lower_bounds, cells = np.concatenate([patch_bounds, level[usable_parts]]), int(usable_cells.sum())
+    by_white = np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1)
+    sources, of_sun = by_white.shape[1], np.ones((by_sun.shape[1], 3))
     unknown = Unknown(
-        np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1),
-        np.concatenate([lower_bounds, np.full((cells, 3), 1e-6)]),
-        np.concatenate([patch_bounds, _daylight(level[usable_parts]), np.tile(daylight, (cells, 1))]),
+        np.concatenate([np.repeat(by_white[..., None], 3, 2), by_sun], 1),
+        np.concatenate([lower_bounds, np.full((cells, 3), 1e-6), 1e-6 * of_sun]),
+        np.concatenate([patch_bounds, _daylight(level[usable_parts]), np.tile(daylight, (cells, 1)), of_sun]),
+        np.arange(sources + len(of_sun)) >= sources,
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
@@ -116,20 +132,21 @@ def find_missing_light(
 
     patch_radiance = lamp_of @ radiances[: len(patch_bounds)]
     solved = dict(zip(patches, patch_radiance, strict=True))
-    E = received + unknown.contribution @ radiances
+    E = received + unknown.irradiance(radiances)
     patch_shares = by_patch * (patch_radiance @ LUMINANCE) / (E @ LUMINANCE)[:, None]
-    sunlit = {patch for patch, mask in masks.items() if _mostly_lit(field, mask)}
+    in_sun = {patch for patch, mask in masks.items() if _mostly_lit(field, mask)}
     strong = (patch_shares > LEVELS.gain).sum(0) >= LEVELS.many
     lamps = tuple(
         Lamp(patch, solved[patch].astype(np.float32), False, clipped=True, spread=spread)
         for k, patch in enumerate(patches)
-        if strong[k] and (solved[patch] > MISSING.lamp * bound[patch]).all() and patch not in sunlit
+        if strong[k] and (solved[patch] > MISSING.lamp * bound[patch]).all() and patch not in in_sun
     )
     opening_radiance = np.tile(daylight, (len(through.T), 1))
-    opening_radiance[usable_cells] = radiances[len(lower_bounds) :]
+    opening_radiance[usable_cells] = radiances[len(lower_bounds) : sources]
     level[usable_parts] = radiances[len(patch_bounds) : len(lower_bounds)]
     low, size = field.outer_box
-    share = float((unknown.contribution[:, len(patch_bounds) :] @ radiances[len(patch_bounds) :]).sum() / E.sum())
+    outside = slice(len(patch_bounds), sources)
+    share = float((by_white[:, outside] @ radiances[outside]).sum() / E.sum())
     openings = Openings(low, size, opening_radiance[cell].astype(np.float32), share, windows)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
@@ -137,7 +154,17 @@ def find_missing_light(
     )
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
     notes = (note,) if share >= LEVELS.gain else ()
-    return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, notes)
+    sun = radiances[-1] if sunlit.any() else np.ones(3)
+    return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, sun, notes)
+
+
+def _by_sun(field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
+    """E at m elements from the sun and from what it makes `sunlit` elements send, (m, 1, 3) float64; else (m, 0, 3)."""
+    if not sunlit.any():
+        return np.zeros((len(element), 0, 3))
+    reflected = np.where(sunlit[:, None], radiance, 0).astype(np.float32)
+    alone = field.with_openings(None).with_light(reflected, Environment.dark())
+    return irradiance_at(alone, element, seed)[:, None]
 
 
 def _daylight(radiance: np.ndarray) -> np.ndarray:

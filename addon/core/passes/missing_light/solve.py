@@ -40,17 +40,24 @@ class Unknown:
 
     Attributes
     ----------
-    contribution : (m, k) float64
+    contribution : (m, k, 3) float64
         E from each at radiance 1.
     lower : (k, 3) float64
         Lower bounds of their radiances.
     expected : (k, 3) float64
         Radiances if they are no lamps.
+    measured : (k,) bool
+        Whether `expected` was measured: its level then has a prior of the full weight, and no share of one.
     """
 
     contribution: np.ndarray
     lower: np.ndarray
     expected: np.ndarray
+    measured: np.ndarray
+
+    def irradiance(self, radiance: np.ndarray) -> np.ndarray:
+        """E from all of them at radiances ((k, 3)), (m, 3) float64."""
+        return np.einsum("mkc,kc->mc", self.contribution, radiance, optimize=True)
 
 
 class _NegativeLogPosterior:
@@ -58,7 +65,7 @@ class _NegativeLogPosterior:
 
     def __init__(self, sent: np.ndarray, received: np.ndarray, unknown: Unknown, pairs: np.ndarray):
         self._sent = np.log(np.maximum(np.pi * sent, 1e-9))
-        self._received, self._G = received, unknown.contribution
+        self._received, self._unknown = received, unknown
         p, m = len(pairs), len(sent)
         ends = np.stack([np.ones(p), -np.ones(p)], 1).ravel()
         self._difference = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
@@ -67,13 +74,13 @@ class _NegativeLogPosterior:
 
     def log_albedo(self, x: np.ndarray) -> np.ndarray:
         """(m, 3) at log radiances `x` ((k, 3))."""
-        return self._sent - np.log(self._received + self._G @ np.exp(x))
+        return self._sent - np.log(self._received + self._unknown.irradiance(np.exp(x)))
 
     def __call__(self, flat: np.ndarray) -> tuple[float, np.ndarray]:
-        k, (m, channels) = self._G.shape[1], self._sent.shape
+        k, (m, channels) = len(self.expected), self._sent.shape
         x = flat.reshape(k, 3)
         radiance = np.exp(x)
-        E = self._received + self._G @ radiance
+        E = self._received + self._unknown.irradiance(radiance)
         a = self._sent - np.log(E)
         difference = self._difference @ a / MISSING.apart
         value = 0.5 * float(np.log1p(difference**2).sum()) / max(len(difference), 1)
@@ -88,16 +95,16 @@ class _NegativeLogPosterior:
         root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)
         value += LEVELS.sigmas**2 * float((root - 1).mean())
         grad_a += excess / root / (0.1 * channels * m)
-        gradient = -(self._G.T @ (grad_a / E)) * radiance
+        gradient = -np.einsum("mkc,mc->kc", self._unknown.contribution, grad_a / E, optimize=True) * radiance
         deviation = x - self.expected
         level = deviation.mean(1, keepdims=True) / MISSING.unlike
         tint = (deviation - deviation.mean(1, keepdims=True)) / MISSING.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         weight = MISSING.sources * channels / k
-        value += weight * float(np.log1p(level**2).sum() + np.log(coloured).sum())
-        gradient += (
-            weight * 2 * (level / (channels * MISSING.unlike * (1 + level**2)) + tint / (MISSING.tint * coloured))
-        )
+        of_level = np.where(self._unknown.measured, MISSING.sources * channels, weight)[:, None]
+        value += float((of_level * np.log1p(level**2)).sum() + weight * np.log(coloured).sum())
+        gradient += 2 * of_level * level / (channels * MISSING.unlike * (1 + level**2))
+        gradient += 2 * weight * tint / (MISSING.tint * coloured)
         return value, gradient.ravel()
 
 

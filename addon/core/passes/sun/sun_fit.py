@@ -114,6 +114,11 @@ class SolvedSun:
     _even: Spots
     _edges: Edges
 
+    def times(self, factor: np.ndarray) -> Sun:
+        """The sun so many times as bright, (3,): what of that no sun's colour may be goes into its luminance."""
+        irradiance = self.sun.irradiance * factor
+        return replace(self.sun, irradiance=of_luminance(np.append(irradiance, irradiance @ LUMINANCE)))
+
     def under(self, factor: np.ndarray) -> Sun:
         """The sun again, all other light having changed by factors ((m, 3)) at the sample that it was found with."""
         spots = self._edges.spots

@@ -198,6 +198,11 @@ class Edges:
         difference = np.clip(value[self.a[mixed]] - value[self.b[mixed]], -LIGHT_FIT.cap, LIGHT_FIT.cap)
         return Guess(direction, -float(difference.sum() / np.sqrt(max(mixed.sum(), 1))))
 
+    def mostly_clipped(self, direction: np.ndarray) -> bool:
+        """Whether of most of what a direction lights along its edges no more than a lower bound is known."""
+        lit = self._two_sides(direction, self.spots.contribution(direction) > 0)[0]
+        return 2 * np.count_nonzero(self.spots.clipped[lit]) > len(lit)
+
     def strengths(self, direction: np.ndarray) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 

@@ -22,6 +22,8 @@ def strength_without_gloss(
 ) -> Sun | None:
     """The field's sun with the irradiance that makes light and shade alike; None where too few tell it, or no sun's.
 
+    Nor where most of what it lights is clipped: what it throws tells more than a lower bound does (`clipped_sunlight`).
+
     Parameters
     ----------
     field : LightField
@@ -44,7 +46,8 @@ def strength_without_gloss(
     if len(beside) < LEVELS.few:
         return None
     spots = Spots(field.with_light(diffuse), beside, irradiance[beside].astype(np.float64), object_id, clipped)
-    strengths = Edges(spots).strengths(sun.direction)
-    if strengths[-1] <= 0 or not is_sunlike(strengths):
+    edges = Edges(spots)
+    strengths = edges.strengths(sun.direction)
+    if edges.mostly_clipped(sun.direction) or strengths[-1] <= 0 or not is_sunlike(strengths):
         return None
     return replace(sun, irradiance=of_luminance(strengths))

@@ -10,9 +10,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from addon.core.light.environment import Environment
-from addon.core.light.few_elements import irradiance_at
+from addon.core.light.few_elements import from_sun, irradiance_at
 from addon.core.light.mirrors import Mirror
 from addon.core.light.openings import CELLS, Openings
+from addon.core.light.sun import Sun
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, measured_patches
 from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing, same_lamps
@@ -213,7 +214,7 @@ def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
     received = np.ones((m, 3))
     sent = 0.5 / np.pi * (received + 20 * through)
     sent[far] *= 200
-    unknown = Unknown(through, np.full((1, 3), 1e-6), np.ones((1, 3)))
+    unknown = Unknown(np.repeat(through[..., None], 3, 2), np.full((1, 3), 1e-6), np.ones((1, 3)), np.zeros(1, bool))
     pairs = rng.integers(0, m, (8 * m, 2))
     (found,), _ = solve(sent, received, unknown, pairs)
     assert found == pytest.approx(20, rel=0.3)
@@ -284,8 +285,28 @@ def test_a_lamp_behind_faces_that_closed_a_hole_is_told_like_one_in_the_hole():
         assert panel.corners[..., 2].max() < place[:, 2].min()
 
 
+@pytest.mark.parametrize("told", [0.33, 2.5])
+def test_a_sun_of_which_frames_show_a_lower_bound_is_told_from_what_it_throws(told):
+    """It falls through the hole onto the floor; its irradiance is told wrong by a factor, which counts as well."""
+    room = box(hole=True)
+    everything, irradiance = np.arange(len(room.atlas)), np.float32([60, 55, 45])
+    sun = Sun(np.float32([0.1, 0.2, 0.97]) / np.linalg.norm([0.1, 0.2, 0.97]), irradiance, 0.005)
+    rho = np.tile(np.float32([0.5, 0.45, 0.4]), (len(room.atlas), 1))
+    radiance = np.zeros((len(room.atlas), 3), np.float32)
+    for bounce in range(6):
+        radiance = rho * irradiance_at(room.field(radiance).with_sun(sun), everything, bounce) / np.pi
+        radiance = radiance.astype(np.float32)
+    sunlit = from_sun(room.field(radiance).with_sun(sun), everything).any(1)
+    assert 2 < sunlit.sum() < len(sunlit) / 10
+    shown = np.where(sunlit[:, None], told * radiance, radiance).astype(np.float32)
+    field = room.field(shown).with_sun(replace(sun, irradiance=told * irradiance))
+    found = find_missing_light(field, ~sunlit, [], 0, sunlit=sunlit)
+    assert (np.abs(np.log(told * found.sun)) < 0.8 * np.abs(np.log(told))).all()
+    assert find_missing_light(field, ~sunlit, [], 0).sun == pytest.approx(np.ones(3))
+
+
 def test_where_nothing_is_unknown_nothing_is_solved_for():
-    none = Unknown(np.zeros((40, 0)), np.zeros((0, 3)), np.zeros((0, 3)))
+    none = Unknown(np.zeros((40, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
     pairs = np.arange(40).reshape(-1, 2)
     found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
     assert found.shape == (0, 3) and spread == (0, 0)
