@@ -115,7 +115,7 @@ class SolvedSun:
     _edges: Edges
 
     def times(self, factor: np.ndarray) -> Sun:
-        """The sun so many times as bright, (3,): what of that no sun's colour may be goes into its luminance."""
+        """The sun so many times as bright ((3,)), of a colour that a sun can have."""
         irradiance = self.sun.irradiance * factor
         return replace(self.sun, irradiance=of_luminance(np.append(irradiance, irradiance @ LUMINANCE)))
 

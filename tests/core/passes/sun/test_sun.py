@@ -112,6 +112,9 @@ def test_gloss_in_shade_no_longer_makes_the_sun_weak(room):
     again = strength_without_gloss(field, lit.radiance, found.irradiance - sunlight, lit.seen, lit.clipped > 0.5)
     assert again is not None and np.array_equal(again.direction, found.sun.direction)
     assert np.allclose(again.irradiance, sunny.SUN, rtol=0.15)
+    # Of most that it lights no more than a lower bound is known: the edges have nothing to add.
+    clipped = (sunny.sun_on(room) > 0) & (np.arange(len(room.atlas)) % 4 > 0)
+    assert strength_without_gloss(field, lit.radiance, found.irradiance - sunlight, lit.seen, clipped) is None
 
 
 @pytest.mark.parametrize("sun", [sunny.SUN, np.zeros(3)])
