@@ -280,6 +280,6 @@ def held_out_costs(
 
 def element_costs(dense: DenseProblem, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
-    lobe = solve(dense, dense.at(fit.phi), fit.kappa, scale, psi=fit.psi).cost[0]
-    # The rays' noise is itself known by few of them: what is taken out may be many times what there is.
-    return np.maximum(lobe, 0), solve(dense, None, fit.kappa_lambertian, scale).cost[0]
+    phi_slice = dense.at(fit.phi)
+    lobe = solve(dense, phi_slice, fit.kappa, scale, psi=fit.psi).cost[0]
+    return lobe, solve(dense, None, fit.kappa_lambertian, scale).cost[0]

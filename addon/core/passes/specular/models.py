@@ -60,8 +60,14 @@ class Choice:
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
-    """Share of the elements' costs that the lobe saves, and the same in standard errors."""
+    """Share of the elements' costs that the lobe saves, and the same in standard errors.
+
+    Nothing where it seems to save more than all: the rays' noise that is taken out of a cost is itself told by few of
+    them, and for broad lobes it may come out at many times the cost.
+    """
     saved = without - with_lobe
+    if saved.sum() > max(without.sum(), 0):
+        return 0.0, 0.0
     error = saved.std() / np.sqrt(len(saved))
     # Elements seen once cost nothing either way, but for rounding.
     return float(saved.sum() / max(without.sum(), 1e-6 * len(saved))), float(saved.mean() / max(error, 1e-30))
