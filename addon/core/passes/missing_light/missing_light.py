@@ -121,10 +121,10 @@ def find_missing_light(
     by_white = np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1)
     sources, of_sun = by_white.shape[1], np.ones((by_sun.shape[1], 3))
     unknown = Unknown(
-        np.concatenate([np.repeat(by_white[..., None], 3, 2), by_sun], 1),
+        by_white,
+        by_sun,
         np.concatenate([lower_bounds, np.full((cells, 3), 1e-6), 1e-6 * of_sun]),
         np.concatenate([patch_bounds, _daylight(level[usable_parts]), np.tile(daylight, (cells, 1)), of_sun]),
-        np.arange(sources + len(of_sun)) >= sources,
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)

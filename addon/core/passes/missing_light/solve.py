@@ -40,24 +40,29 @@ class Unknown:
 
     Attributes
     ----------
-    contribution : (m, k, 3) float64
+    contribution : (m, k) float64
         E from each at radiance 1.
-    lower : (k, 3) float64
-        Lower bounds of their radiances.
-    expected : (k, 3) float64
-        Radiances if they are no lamps.
-    measured : (k,) bool
-        Whether `expected` was measured: its level then has a prior of the full weight, and no share of one.
+    by_sun : (m, s, 3) float64
+        E by the sun as it was measured, for which a factor is sought; s is 0 where none is.
+    lower : (k + s, 3) float64
+        Lower bounds of radiances and factor.
+    expected : (k + s, 3) float64
+        Radiances if they are no lamps, and 1. As the sun was measured, its level has a prior of the full weight.
     """
 
     contribution: np.ndarray
+    by_sun: np.ndarray
     lower: np.ndarray
     expected: np.ndarray
-    measured: np.ndarray
 
     def irradiance(self, radiance: np.ndarray) -> np.ndarray:
-        """E from all of them at radiances ((k, 3)), (m, 3) float64."""
-        return np.einsum("mkc,kc->mc", self.contribution, radiance, optimize=True)
+        """E from all of them at radiances and a factor ((k + s, 3)), (m, 3) float64."""
+        k = self.contribution.shape[1]
+        return self.contribution @ radiance[:k] + (self.by_sun * radiance[k:]).sum(1)
+
+    def transposed(self, values: np.ndarray) -> np.ndarray:
+        """Sums of values ((m, 3)) over the elements as each contributes to them, (k + s, 3) float64."""
+        return np.concatenate([self.contribution.T @ values, (self.by_sun * values[:, None]).sum(0)])
 
 
 class _NegativeLogPosterior:
@@ -95,13 +100,14 @@ class _NegativeLogPosterior:
         root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)
         value += LEVELS.sigmas**2 * float((root - 1).mean())
         grad_a += excess / root / (0.1 * channels * m)
-        gradient = -np.einsum("mkc,mc->kc", self._unknown.contribution, grad_a / E, optimize=True) * radiance
+        gradient = -self._unknown.transposed(grad_a / E) * radiance
         deviation = x - self.expected
         level = deviation.mean(1, keepdims=True) / MISSING.unlike
         tint = (deviation - deviation.mean(1, keepdims=True)) / MISSING.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         weight = MISSING.sources * channels / k
-        of_level = np.where(self._unknown.measured, MISSING.sources * channels, weight)[:, None]
+        of_level = np.full((k, 1), weight)
+        of_level[self._unknown.contribution.shape[1] :] = MISSING.sources * channels
         value += float((of_level * np.log1p(level**2)).sum() + weight * np.log(coloured).sum())
         gradient += 2 * of_level * level / (channels * MISSING.unlike * (1 + level**2))
         gradient += 2 * weight * tint / (MISSING.tint * coloured)

@@ -214,7 +214,7 @@ def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
     received = np.ones((m, 3))
     sent = 0.5 / np.pi * (received + 20 * through)
     sent[far] *= 200
-    unknown = Unknown(np.repeat(through[..., None], 3, 2), np.full((1, 3), 1e-6), np.ones((1, 3)), np.zeros(1, bool))
+    unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.ones((1, 3)))
     pairs = rng.integers(0, m, (8 * m, 2))
     (found,), _ = solve(sent, received, unknown, pairs)
     assert found == pytest.approx(20, rel=0.3)
@@ -306,7 +306,7 @@ def test_a_sun_of_which_frames_show_a_lower_bound_is_told_from_what_it_throws(to
 
 
 def test_where_nothing_is_unknown_nothing_is_solved_for():
-    none = Unknown(np.zeros((40, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
+    none = Unknown(np.zeros((40, 0)), np.zeros((40, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
     pairs = np.arange(40).reshape(-1, 2)
     found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
     assert found.shape == (0, 3) and spread == (0, 0)
