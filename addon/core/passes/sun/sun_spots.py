@@ -198,16 +198,12 @@ class Edges:
         difference = np.clip(value[self.a[mixed]] - value[self.b[mixed]], -LIGHT_FIT.cap, LIGHT_FIT.cap)
         return Guess(direction, -float(difference.sum() / np.sqrt(max(mixed.sum(), 1))))
 
-    def mostly_clipped(self, direction: np.ndarray) -> bool:
-        """Whether of most of what a direction lights along its edges no more than a lower bound is known."""
-        lit = self._two_sides(direction, self.spots.contribution(direction) > 0)[0]
-        return 2 * np.count_nonzero(self.spots.clipped[lit]) > len(lit)
-
-    def strengths(self, direction: np.ndarray) -> np.ndarray:
+    def strengths(self, direction: np.ndarray, bounds: bool = True) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
         Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
         median share of what is not clipped, white if that is too little. Where all is, the median bound; 0 if unknown.
+        Without `bounds` it is also unknown where most of what is lit is clipped.
         """
         spots = self.spots
         contribution = spots.contribution(direction)
@@ -215,6 +211,8 @@ class Edges:
         if len(a) < LEVELS.enough:
             return np.zeros(4)
         full, clipped = contribution[a], spots.clipped[a]
+        if not bounds and 2 * np.count_nonzero(clipped) > len(a):
+            return np.zeros(4)
 
         def needed(weights: np.ndarray) -> np.ndarray:
             value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights

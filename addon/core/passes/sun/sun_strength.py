@@ -46,8 +46,7 @@ def strength_without_gloss(
     if len(beside) < LEVELS.few:
         return None
     spots = Spots(field.with_light(diffuse), beside, irradiance[beside].astype(np.float64), object_id, clipped)
-    edges = Edges(spots)
-    strengths = edges.strengths(sun.direction)
-    if edges.mostly_clipped(sun.direction) or strengths[-1] <= 0 or not is_sunlike(strengths):
+    strengths = Edges(spots).strengths(sun.direction, bounds=False)
+    if strengths[-1] <= 0 or not is_sunlike(strengths):
         return None
     return replace(sun, irradiance=of_luminance(strengths))
