@@ -89,31 +89,24 @@ class Corrected(Stages):
         """The same, but with none for some objects."""
         specular = self.specular()
         see_through = [m.object_id for m in specular.materials if m.model.see_through]
-        albedo = self.albedo_under(self.irradiance, specular.taken, without)
+        albedo = self.albedo_under(self.irradiance, without)
         # What shows its background has no albedo that was measured.
         origin = np.where(np.isin(self.surface().atlas.object_id, see_through), np.int8(NO_ALBEDO), albedo.origin)
         return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)
 
-    def albedo_under(
-        self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0, without: set[int] | None = None
-    ) -> Albedo:
-        """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32.
-
-        The objects `without` get none; by default the lamps that were found.
-        """
-        shading = self.shading()
-        atlas, lit_diffuse = self.surface().atlas, self.lit_diffuse()
-        without = shading.emitters if without is None else without
+    def albedo_under(self, irradiance: np.ndarray, without: set[int]) -> Albedo:
+        """The albedo that L_d less its specular part has under an E, (n, 3) float32; the objects `without` get none."""
+        atlas, instances, found = self.surface().atlas, self.capture.instances, self.specular()
         if "shading" in self.settings.published:
-            return published_light.albedo_of(atlas, lit_diffuse, irradiance, self.capture.instances, without, specular)
+            return published_light.albedo_of(atlas, found.rest, irradiance, instances, without)
         return albedo_of(
             atlas,
-            lit_diffuse,
+            found.rest,
             irradiance,
-            shading.relative_error,
-            self.capture.instances,
+            self.shading().relative_error,
+            instances,
             without,
-            specular,
+            found.specular,
             self.settings.without,
         )
 
@@ -175,7 +168,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
     for _ in range(CORRECTED.rounds):
-        albedo = run.albedo_under(before * scale, run.specular().taken, others)
+        albedo = run.albedo_under(before * scale, others)
         chosen = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
         if white.at is not None:
             chosen &= (

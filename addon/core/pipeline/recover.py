@@ -132,7 +132,7 @@ class Recovery(Corrected):
         to_texture = (albedo.origin == FILLED) & ~np.isin(surface.atlas.object_id, guessed)
         # E is off for neighbours alike, which makes no texture.
         error = relative_error(
-            self.lit_diffuse(), surface.atlas.object_id, "object-spread" not in self.settings.without
+            self.specular().rest, surface.atlas.object_id, "object-spread" not in self.settings.without
         )
         return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, to_texture, error)
 

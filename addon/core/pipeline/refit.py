@@ -165,7 +165,7 @@ class Refit(Recovery):
         )
         if arrays is None:
             raise _again(self.store.folder, "its stages were cleared or are another run's")
-        return Specular.from_store(arrays, meta or {}), overrides.lobes()
+        return Specular.from_store(arrays, meta or {}, self.lit_diffuse()), overrides.lobes()
 
     @cached_property
     def touched(self) -> set[int]:

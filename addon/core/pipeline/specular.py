@@ -29,8 +29,10 @@ from ..passes.unlit_lamps.unlit import unlit
 from ..progress import Rounds
 from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.element_groups import ElementGroups
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance, Pixels, class_names
 from ..scene.samples import Samples
+from ..scene.visibility import SATURATED
 from ..significance import LEVELS
 from .choose_models import Chosen, Looked, Room, choose_models, look_at
 from .frames import STAGE as FRAMES
@@ -58,37 +60,43 @@ class Specular:
         One for each instance, by object_id.
     specular : (n, 3) float32
         Part of each element's L_d that is specular, or came through it from behind.
+    rest : LitDiffuse
+        L_d without it, and what that rests on. Clipped where in every view the specular part is more than what remains.
     excess : (n, 3) float32
         What is to be added to E, as glossy things reflect more onto each element than their L_d says, and under `sun`.
-    hidden : (n,) bool
-        In every view the specular part is more than what remains: L_d says nothing of the albedo.
     sun : Sun, optional
         The shading stage's with another irradiance (`sun-strength`).
     """
 
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
+    rest: LitDiffuse
     excess: np.ndarray
-    hidden: np.ndarray
     sun: Sun | None = None
-
-    @property
-    def taken(self) -> np.ndarray:
-        """`specular`, NaN where it hides the diffuse part, (n, 3) float32."""
-        return np.where(self.hidden[:, None], np.float32(np.nan), self.specular)
 
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
         meta: dict[str, Any] = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
         meta["sun"] = self.sun and self.sun.as_lists()
-        return {"specular": self.specular, "excess": self.excess, "hidden": self.hidden}, meta
+        return {
+            "specular": self.specular, "excess": self.excess,
+            "rest_spread": self.rest.interquartile_range, "rest_count": self.rest.count, "rest_tier": self.rest.tier,
+        }, meta  # fmt: skip
 
     @staticmethod
-    def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
-        """From the stage's arrays, and the descriptions as JSON has them."""
+    def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], lit_diffuse: LitDiffuse) -> Specular:
+        """From the stage's arrays, the descriptions as JSON has them, and L_d with its specular part."""
         materials = tuple(from_json(entry) for entry in meta["materials"])
         sun = meta["sun"] and Sun.from_lists(meta["sun"])
-        return Specular(materials, arrays["specular"], arrays["excess"], arrays["hidden"], sun)
+        specular = arrays["specular"]
+        rest = LitDiffuse(
+            lit_diffuse.radiance - specular,
+            arrays["rest_spread"],
+            arrays["rest_count"],
+            arrays["rest_tier"],
+            lit_diffuse.clipped,
+        )
+        return Specular(materials, specular, rest, arrays["excess"], sun)
 
 
 @dataclass(frozen=True)
@@ -169,16 +177,18 @@ def fit_specular(
     give_back()
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
-    excess, hidden = np.zeros_like(specular), np.zeros(len(specular), bool)
+    excess, rest = np.zeros_like(specular), room.lit_diffuse
     if held is not None:
-        specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
+        again = np.isin(field.atlas.object_id, list(held.only))
+        specular = np.where(again[:, None], specular, held.found.specular)
         excess = held.found.excess
-        hidden = held.found.hidden & ~np.isin(field.atlas.object_id, list(held.only))
+        rest = rest.where(again, held.found.rest)
     if refine:
         fitted = [m for m in materials if m.object_id not in held_materials]
         _without_backgrounds(specular, fitted, room, maker)
         if pictures is not None:
-            hidden |= _remove(specular, fitted, room, pictures)
+            rest = _remove(specular, rest, fitted, room, pictures)
+    rest = replace(rest, radiance=room.lit_diffuse.radiance - specular)
     give_back()
     if refine > 1 and held is None:
         seen_elements = np.flatnonzero(room.lit_diffuse.seen)
@@ -188,8 +198,8 @@ def fit_specular(
             progress=room.progress, share=(0.85, 1.0), without=without,
         )  # fmt: skip
     if held is not None:
-        return Specular(materials, specular, excess, hidden, held.found.sun)
-    found = Specular(materials, specular, excess, hidden)
+        return Specular(materials, specular, rest, excess, held.found.sun)
+    found = Specular(materials, specular, rest, excess)
     return _under_sun(found, room) if refine and "sun-strength" not in without else found
 
 
@@ -200,11 +210,12 @@ def _under_sun(found: Specular, room: Room) -> Specular:
     if before is None or before.seen:
         return found
     diffuse_objects = [m.object_id for m in found.materials if m.model.has_diffuse and not m.model.gives_light]
-    good = lit_diffuse.seen & ~found.hidden & np.isin(field.atlas.object_id, diffuse_objects)
+    hidden = (found.rest.tier == SATURATED) & (lit_diffuse.tier != SATURATED)
+    good = lit_diffuse.seen & ~hidden & np.isin(field.atlas.object_id, diffuse_objects)
     elements = np.arange(len(field.atlas))
     sunlight = sun_irradiance(field, elements, room.irradiance.mean(1), settings.threads, settings.seed)
     sun = strength_without_gloss(
-        field, lit_diffuse.radiance - found.specular, room.irradiance + found.excess - sunlight, good,
+        field, found.rest.radiance, room.irradiance + found.excess - sunlight, good,
         lit_diffuse.clipped > 0.5, settings.seed,
     )  # fmt: skip
     if sun is None:
@@ -296,14 +307,16 @@ def _copy_same_materials(by_id: dict[int, ObjectMaterial], given: Mapping[int, G
             by_id[i] = same_material(by_id[source], by_id[i])
 
 
-def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, pictures: Pictures) -> np.ndarray:
-    """Put the specular part of glossy things' L_d into `specular`, (n, 3); where it hides the rest, (n,) bool."""
+def _remove(
+    specular: np.ndarray, rest: LitDiffuse, materials: list[ObjectMaterial], room: Room, pictures: Pictures
+) -> LitDiffuse:
+    """Put the specular part of glossy things' L_d into `specular`, (n, 3); the `rest` with theirs."""
     glossy = [m for m in materials if m.model.layered]
     field, samples, settings = room.field, room.samples, room.settings
     glossy_mask = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
     frames_showing = np.unique(samples.frame[glossy_mask[samples.element]])
     if not len(frames_showing):
-        return np.zeros(len(glossy_mask), bool)
+        return rest
     separated = without_specular(
         SpecularPart(field, glossy, settings.seed), field, room.lit_diffuse, glossy_mask,
         [pictures.frames[i] for i in frames_showing], pictures.read, median=settings.median, seed=settings.seed,
@@ -311,7 +324,7 @@ def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, p
         progress=Rounds(room.progress, 0.7, 1.0),
     )  # fmt: skip
     specular[glossy_mask] = separated.specular[glossy_mask]
-    return separated.hidden
+    return rest.where(~glossy_mask, separated.rest)
 
 
 def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems) -> None:

@@ -294,7 +294,10 @@ class Stages:
         """phi, psi and the model of every object."""
         self.shading()
         result = self._stage(
-            specular.STAGE, self.fitted, lambda result: result.to_store(self.overrides), Specular.from_store
+            specular.STAGE,
+            self.fitted,
+            lambda result: result.to_store(self.overrides),
+            lambda arrays, meta: Specular.from_store(arrays, meta, self.lit_diffuse()),
         )
         self.store.drop(self.store.parts(specular.STAGE.name))  # they are in it
         return result

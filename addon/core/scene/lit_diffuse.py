@@ -1,6 +1,6 @@
 """The lit diffuse texture L_d: what the frames show of every element, and how much it rests on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -28,6 +28,11 @@ class LitDiffuse:
     count: np.ndarray
     tier: np.ndarray
     clipped: np.ndarray
+
+    def where(self, mask: np.ndarray, other: "LitDiffuse") -> "LitDiffuse":
+        """This where `mask` ((n,) bool), the other one elsewhere."""
+        parts = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
+        return LitDiffuse(*(np.where(mask if a.ndim == 1 else mask[:, None], a, b) for a, b in parts))
 
     @property
     def seen(self) -> np.ndarray:

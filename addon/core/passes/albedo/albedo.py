@@ -70,22 +70,22 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
-def specular_error(lit_diffuse: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
+def specular_error(rest: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
     """Relative standard error of L_d less its specular part: `ALBEDO.specular_error` max(specular / rest - 1, 0).
 
     Where the specular part is more than the rest, little is known of that: burnt wood under a window's image.
 
     Parameters
     ----------
-    lit_diffuse : (n, 3) float32
-        L_d with its `specular` part, (n, 3) or 0. Either may hold NaN: nothing was measured there.
+    rest : (n, 3) float32
+        L_d without its `specular` part, (n, 3) or 0. Either may hold NaN: nothing was measured there.
 
     Returns
     -------
     (n,) float32
     """
-    taken = np.maximum(np.nan_to_num(np.broadcast_to(specular, lit_diffuse.shape)), 0).sum(1)
-    left = np.maximum(np.nan_to_num(lit_diffuse).sum(1) - taken, ALBEDO.floor * taken)
+    taken = np.maximum(np.nan_to_num(np.broadcast_to(specular, rest.shape)), 0).sum(1)
+    left = np.maximum(np.nan_to_num(rest).sum(1), ALBEDO.floor * taken)
     ratio = np.divide(taken, left, out=np.zeros(len(taken), np.float32), where=left > 0)
     return ALBEDO.specular_error * np.maximum(ratio - 1, 0)
 
@@ -114,6 +114,8 @@ def albedo_of(
 
     Parameters
     ----------
+    lit_diffuse : LitDiffuse
+        L_d without its `specular` part, and what that rests on.
     irradiance : (n, 3) float32
         E, radiance * steradian.
     irradiance_error : (n,) float32
@@ -121,11 +123,11 @@ def albedo_of(
     emitters : set of int
         Objects that have no albedo.
     specular : (n, 3) float32
-        Part of L_d that is not diffuse.
+        Part that was taken out as not diffuse.
     without : collection of str
         Passes left out.
     """
-    rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
+    rho, valid = quotient(np.maximum(lit_diffuse.radiance, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), irradiance_error)
     if "specular-error" not in without:
         error = np.hypot(error, specular_error(lit_diffuse.radiance, specular))

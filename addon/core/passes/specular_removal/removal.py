@@ -42,12 +42,13 @@ class Removed:
     ----------
     specular : (n, 3) float32
         Part of L_d that is not diffuse; 0 for elements that were not requested.
-    hidden : (n,) bool
-        In every view the specular part is far more than the remainder, and not on most of the object: that is dark.
+    rest : LitDiffuse
+        L_d without it, and what that rests on: the remainders' spread, not the highlights'. Clipped where in every view
+        the specular part is far more than the remainder, and not on most of the object: that is dark.
     """
 
     specular: np.ndarray
-    hidden: np.ndarray
+    rest: LitDiffuse
 
 
 class SpecularPart:
@@ -184,7 +185,16 @@ def without_specular(
     specular = np.where(measured[:, None], radiance - np.maximum(np.nan_to_num(diffuse.radiance), 0), 0).astype(
         np.float32
     )
-    hidden, object_id = measured & (diffuse.tier == SATURATED), field.atlas.object_id
+    bounds, object_id = measured & (diffuse.tier == SATURATED), field.atlas.object_id
     objects = int(object_id.max()) + 1
-    share = np.bincount(object_id, hidden, objects) / np.maximum(np.bincount(object_id, measured, objects), 1)
-    return Removed(specular, hidden & (share[object_id] <= 0.5))
+    share = np.bincount(object_id, bounds, objects) / np.maximum(np.bincount(object_id, measured, objects), 1)
+    # Of what is dark the highlights tell as much as they do elsewhere.
+    known = measured & (~bounds | (share[object_id] <= 0.5))
+    rest = replace(
+        lit,
+        radiance=lit.radiance - specular,
+        interquartile_range=np.where(known[:, None], diffuse.interquartile_range, lit.interquartile_range),
+        count=np.where(known, diffuse.count, lit.count),
+        tier=np.where(known, diffuse.tier, lit.tier),
+    )
+    return Removed(specular, rest)

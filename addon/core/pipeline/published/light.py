@@ -41,18 +41,13 @@ def shade(
 
 
 def albedo_of(
-    atlas: Atlas,
-    lit_diffuse: LitDiffuse,
-    irradiance: np.ndarray,
-    instances: tuple[Instance, ...],
-    emitters: set[int],
-    specular: np.ndarray | float = 0.0,
+    atlas: Atlas, lit_diffuse: LitDiffuse, irradiance: np.ndarray, instances: tuple[Instance, ...], emitters: set[int]
 ) -> Albedo:
     """The quotient as it is, clamped at 1; elements without one take their object's albedo.
 
     Parameters as of `albedo.albedo_of`. The error is that of the median.
     """
-    rho = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
+    rho = quotient(np.maximum(lit_diffuse.radiance, 0), irradiance)
     valid = np.isfinite(rho).all(1) & (lit_diffuse.tier != SATURATED)
     albedo = fill(atlas, rho, valid, class_names(instances), emitters)
     return replace(
