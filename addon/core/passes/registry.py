@@ -116,7 +116,6 @@ PASSES = (
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
         class_albedo="Shrinks the albedo of objects of one class towards one another's.",
         object_spread="Takes the spread of single observations from others of the object.",
-        specular_error="Counts what is left beside a greater specular part as less certain.",
         texture_fill="Gives what is filled in the texture of its plane's measured part.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",
     ),

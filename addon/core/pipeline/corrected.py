@@ -100,14 +100,7 @@ class Corrected(Stages):
         if "shading" in self.settings.published:
             return published_light.albedo_of(atlas, found.rest, irradiance, instances, without)
         return albedo_of(
-            atlas,
-            found.rest,
-            irradiance,
-            self.shading().relative_error,
-            instances,
-            without,
-            found.specular,
-            self.settings.without,
+            atlas, found.rest, irradiance, self.shading().relative_error, instances, without, self.settings.without
         )
 
     def base_color(self) -> np.ndarray:

@@ -70,26 +70,6 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
-def specular_error(rest: np.ndarray, specular: np.ndarray | float) -> np.ndarray:
-    """Relative standard error of L_d less its specular part: `ALBEDO.specular_error` max(specular / rest - 1, 0).
-
-    Where the specular part is more than the rest, little is known of that: burnt wood under a window's image.
-
-    Parameters
-    ----------
-    rest : (n, 3) float32
-        L_d without its `specular` part, (n, 3) or 0. Either may hold NaN: nothing was measured there.
-
-    Returns
-    -------
-    (n,) float32
-    """
-    taken = np.maximum(np.nan_to_num(np.broadcast_to(specular, rest.shape)), 0).sum(1)
-    left = np.maximum(np.nan_to_num(rest).sum(1), ALBEDO.floor * taken)
-    ratio = np.divide(taken, left, out=np.zeros(len(taken), np.float32), where=left > 0)
-    return ALBEDO.specular_error * np.maximum(ratio - 1, 0)
-
-
 def without_emitters(atlas: Atlas, mask: np.ndarray, emitters: set[int]) -> np.ndarray:
     """The elements of `mask`, (n,) bool, that are no emitter's."""
     return mask & ~np.isin(atlas.object_id, list(emitters))
@@ -107,7 +87,6 @@ def albedo_of(
     irradiance_error: np.ndarray,
     instances: tuple[Instance, ...],
     emitters: set[int],
-    specular: np.ndarray | float = 0.0,
     without: Collection[str] = (),
 ) -> Albedo:
     """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`), to others of its class as well (`of_class`).
@@ -115,22 +94,18 @@ def albedo_of(
     Parameters
     ----------
     lit_diffuse : LitDiffuse
-        L_d without its `specular` part, and what that rests on.
+        L_d without its specular part, and what that rests on.
     irradiance : (n, 3) float32
         E, radiance * steradian.
     irradiance_error : (n,) float32
         Relative error of E.
     emitters : set of int
         Objects that have no albedo.
-    specular : (n, 3) float32
-        Part that was taken out as not diffuse.
     without : collection of str
         Passes left out.
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), irradiance_error)
-    if "specular-error" not in without:
-        error = np.hypot(error, specular_error(lit_diffuse.radiance, specular))
     valid &= lit_diffuse.seen
     if "bias-field" not in without:
         rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))

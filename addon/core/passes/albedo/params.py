@@ -122,17 +122,16 @@ class AlbedoParams:
     ----------
     floor : float
         Below this share of the room's median irradiance a quotient says nothing.
+    alarm : float
+        Share of the elements whose albedo would have to be above 1, from which on the report warns.
     unknown, least_spread : float
         Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
-    specular_error : float
-        Relative standard error of the specular part that is taken out of L_d, as far as it is more than what is left
-        (`specular-error` in the ablation). As far as it is anything, bathrooms and the living room lose .2 to .4 dB.
     """
 
     floor: float = 1e-3
+    alarm: float = 0.05
     unknown: float = 0.7
     least_spread: float = 0.3
-    specular_error: float = 0.2
 
 
 ALBEDO = AlbedoParams()

@@ -13,7 +13,6 @@ from addon.core.passes.albedo.albedo import (
     albedo_of,
     fill,
     quotient,
-    specular_error,
     without_emitters,
 )
 from addon.core.passes.albedo.params import ALBEDO
@@ -127,11 +126,13 @@ def highlit_wall(strength):
     highlight = (0.6 * np.exp(-((distance / 0.4) ** 2)))[:, None].repeat(3, 1).astype(np.float32)
     radiance = true + highlight * np.random.default_rng(0).normal(1, 0.03, (len(atlas), 1)).astype(np.float32)
     tier, none = np.full(len(atlas), CLEAN, np.int8), np.zeros(len(atlas), np.float32)
-    rest = LitDiffuse(radiance - strength * highlight, 0.05 * radiance, count, tier, none)
+    # The highlight is there in some views and not in others, and so is what is taken too much.
+    spread = 0.05 * true + np.abs(strength - 1) * highlight
+    rest = LitDiffuse(radiance - strength * highlight, spread, count, tier, none)
     E = np.full((len(atlas), 3), np.pi, np.float32)
 
     def recovered(without=()):
-        return albedo_of(atlas, rest, E, none, (), set(), strength * highlight, ("bias-field", *without))
+        return albedo_of(atlas, rest, E, none, (), set(), ("bias-field", *without))
 
     return recovered, true, distance
 
@@ -140,16 +141,8 @@ def highlit_wall(strength):
 def test_a_highlight_that_is_predicted_too_bright_leaves_no_burn(strength):
     recovered, true, distance = highlit_wall(strength)
     middle, outside = distance < 0.3, distance > 1.2
-    plain, result = recovered({"specular-error"}), recovered()
+    plain, result = recovered({"albedo-prior"}), recovered()
     off = [np.abs(one.rho[middle] / true - 1).mean() for one in (plain, result)]
     assert off[0] > 0.3 and off[1] < off[0] / 2
     assert np.allclose(result.rho[outside], true, rtol=0.01)
     assert off[1] < 3 * np.median(result.error[middle])  # and its error says how far it may be off
-
-
-def test_nothing_taken_leaves_no_error():
-    rest = np.float32([[0.25] * 3, [NAN] * 3, [-0.75] * 3])
-    assert not specular_error(rest, 0.0).any() and not specular_error(rest, np.zeros((3, 3), np.float32)).any()
-    error = specular_error(rest, np.full((3, 3), 0.75, np.float32))
-    assert error[0] == pytest.approx(2 * ALBEDO.specular_error) and np.isfinite(error).all() and error[2] > 1
-    assert not specular_error(rest, np.full((3, 3), NAN, np.float32)).any()
