@@ -14,7 +14,7 @@ from ..light.openings import looked_out_by
 from ..light.sun import Sun
 from ..luminance import LUMINANCE
 from ..passes.clipped_lamps.patches import measured_patches
-from ..passes.missing_light.missing_light import MissingLight, find_missing_light
+from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
 from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
@@ -62,18 +62,16 @@ def with_all_light(
     good |= clean & barely_seen(dark, good)
     good = good if good.any() else seen
     real = atlas.area > 0
-    # A mesh whose parts were guessed may lack most of its light, whatever is no part of it; and a sun can be told only
-    # once that is known.
-    missing = patches is not None and "missing-light" not in without
     unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
-    unseen = [] if missing or "unseen-lamps" in without else unseen
-    of_light = {*without, "unseen-sky", "whole-sky"} if missing else without
+    unseen = [] if "unseen-lamps" in without else unseen
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
-    light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=of_light)
+    light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
     unmixed = light.without_mixed(field)
     lamps = [lamp.object_id for lamp in light.lamps]
     lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
+    # A mesh whose parts were guessed may lack most of its light, and a sun can be told only once that is known.
+    missing = patches is not None and "missing-light" not in without and is_missing(lit_field, good=reliable, seed=seed)
     sun = dark.sun
     if not missing and sun is None and len(light.received) and "sun" not in without:
         light, sun = with_sun_found(
@@ -87,7 +85,7 @@ def with_all_light(
         radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
     field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
     field = field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ())
-    if patches is None or not missing:
+    if not missing or patches is None:
         return field, light, np.zeros(len(atlas), bool)
     return with_missing_light(dark, field, light, lit_diffuse, reliable, patches, whole, cameras, without, seed)
 
@@ -147,7 +145,7 @@ def with_missing_light(
     without: Collection[str],
     seed: int,
 ) -> tuple[LightField, Light, np.ndarray]:
-    """A room with the light of clipped patches and openings, and a sun's.
+    """A room that lacks light with that of clipped patches and openings, and a sun's.
 
     Last, the unseen elements for which it gives the radiance they send ((n,) bool).
 

@@ -122,14 +122,11 @@ class AlbedoParams:
     ----------
     floor : float
         Below this share of the room's median irradiance a quotient says nothing.
-    alarm : float
-        Share of the elements whose albedo would have to be above 1, from which on the report warns.
     unknown, least_spread : float
         Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
     """
 
     floor: float = 1e-3
-    alarm: float = 0.05
     unknown: float = 0.7
     least_spread: float = 0.3
 

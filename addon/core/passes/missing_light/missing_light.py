@@ -2,6 +2,7 @@
 
 Most of a room's light may come from there. In a living room as a phone gives it, one ceiling lamp is clipped in every
 frame, the other hangs in a part of the ceiling that no frame saw: the light that was measured is a third of all.
+Nothing is done unless albedos above 1 tell that light is missing.
 """
 
 from dataclasses import dataclass
@@ -53,6 +54,15 @@ class MissingLight:
     shut: np.ndarray
     sun: np.ndarray
     notes: tuple[str, ...]
+
+
+def is_missing(field: LightField, good: np.ndarray, seed: int) -> bool:
+    """Whether the light of a room, as it was found, is too little for what it reflects."""
+    element = _sample(field, good, seed)
+    if len(element) < LEVELS.many:
+        return False
+    rho = np.pi * field.radiance[element] / np.maximum(irradiance_at(field, element, seed), 1e-12)
+    return float((rho.max(1) > 1).mean()) > MISSING.alarm
 
 
 def find_missing_light(

@@ -16,6 +16,9 @@ class MissingLightParams:
 
     Attributes
     ----------
+    alarm : float
+        Share of the elements whose albedo would have to be above 1, from which on light is missing: the level at which
+        the report warns.
     rays : int
         Of each of them into its hemisphere, to find through which cells it sees out.
     merged : int
@@ -50,6 +53,7 @@ class MissingLightParams:
         Times its clipped value, in each channel, that the room's light must ask for of a patch that is called a lamp.
     """
 
+    alarm: float = 0.05
     rays: int = 2048
     merged: int = 2
     sky: float = float(np.radians(30))
