@@ -89,13 +89,10 @@ class Specular:
         materials = tuple(from_json(entry) for entry in meta["materials"])
         sun = meta["sun"] and Sun.from_lists(meta["sun"])
         specular = arrays["specular"]
-        rest = LitDiffuse(
-            lit_diffuse.radiance - specular,
-            arrays["rest_spread"],
-            arrays["rest_count"],
-            arrays["rest_tier"],
-            lit_diffuse.clipped,
-        )
+        rest = replace(
+            lit_diffuse, radiance=lit_diffuse.radiance - specular, interquartile_range=arrays["rest_spread"],
+            count=arrays["rest_count"], tier=arrays["rest_tier"],
+        )  # fmt: skip
         return Specular(materials, specular, rest, arrays["excess"], sun)
 
 

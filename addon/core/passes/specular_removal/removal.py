@@ -190,11 +190,5 @@ def without_specular(
     share = np.bincount(object_id, bounds, objects) / np.maximum(np.bincount(object_id, measured, objects), 1)
     # Of what is dark the highlights tell as much as they do elsewhere.
     known = measured & (~bounds | (share[object_id] <= 0.5))
-    rest = replace(
-        lit,
-        radiance=lit.radiance - specular,
-        interquartile_range=np.where(known[:, None], diffuse.interquartile_range, lit.interquartile_range),
-        count=np.where(known, diffuse.count, lit.count),
-        tier=np.where(known, diffuse.tier, lit.tier),
-    )
+    rest = replace(diffuse.where(known, lit), radiance=lit.radiance - specular, clipped=lit.clipped)
     return Removed(specular, rest)
