@@ -28,11 +28,10 @@ from addon.core.settings import Settings
 from scripts.qa_rooms.held import projected_truth
 
 
-def without_excess(recovery: Recovery) -> np.ndarray:
-    """The albedo if glossy objects reflected only the radiance of their medians."""
+def albedo_with(recovery: Recovery, **changed) -> np.ndarray:
+    """The albedo if the specular stage had given something else."""
     variant = copy.copy(recovery)
-    specular = recovery.specular()
-    variant.done = recovery.done | {"specular": dataclasses.replace(specular, excess=np.zeros_like(specular.excess))}
+    variant.done = recovery.done | {"specular": dataclasses.replace(recovery.specular(), **changed)}
     for name in ("irradiance", "albedo"):
         variant.__dict__.pop(name, None)
     return variant.albedo.rho
@@ -43,22 +42,22 @@ def main() -> int:
     settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
     with Store(result) as store:
         recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
-        lit, shading = recovery.lit_diffuse(), recovery.shading()
+        lit = recovery.lit_diffuse()
         held_out = views(capture, recovery)
         base, albedo = recovery.base_color(), recovery.albedo
         specular = recovery.specular().specular
         raw, _ = quotient(np.maximum(lit.radiance - specular, 0), recovery.irradiance)
-        medians = without_excess(recovery)
+        by_medians = {"excess": np.zeros_like(recovery.specular().excess)}
         measured = albedo.origin == MEASURED
         well_observed = measured & (lit.tier == 0) & (lit.count >= 6)
         limit = projected_truth(held_out, len(lit.count), albedo.rho)
         rows = (
             ("Base Color as written", psnr(held_out, base)),
             ("without the compensation for Principled's layering", psnr(held_out, albedo.rho)),
-            ("that, and glossy things lighting by their median", psnr(held_out, medians)),
+            ("that, and glossy things lighting by their median", psnr(held_out, albedo_with(recovery, **by_medians))),
             (
                 "... and the specular part left in the median",
-                psnr(held_out, recovery.albedo_under(shading.irradiance).rho),
+                psnr(held_out, albedo_with(recovery, **by_medians, rest=lit)),
             ),
             ("plain quotient: neither filled in nor shrunk, unseen black", psnr(held_out, np.nan_to_num(raw))),
             ("albedo on measured elements only", psnr(held_out, albedo.rho, measured)),

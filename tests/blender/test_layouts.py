@@ -82,7 +82,7 @@ class Same:
 
         with Store(self.folder / f"result-{name}") as store:
             run = Recovery(capture, store, COARSE, Progress(), layout)
-            return run.albedo_under(run.shading().irradiance).rho, run.surface().atlas
+            return run.albedo_under(run.shading().irradiance, run.emitters).rho, run.surface().atlas
 
 
 @pytest.fixture(scope="module")
