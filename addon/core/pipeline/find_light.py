@@ -14,7 +14,7 @@ from ..light.openings import looked_out_by
 from ..light.sun import Sun
 from ..luminance import LUMINANCE
 from ..passes.clipped_lamps.patches import measured_patches
-from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
+from ..passes.missing_light.missing_light import MissingLight, find_missing_light
 from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
@@ -70,24 +70,30 @@ def with_all_light(
     unmixed = light.without_mixed(field)
     lamps = [lamp.object_id for lamp in light.lamps]
     lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
+
+    def lit(light: Light, sun: Sun | None) -> LightField:
+        field = dark.with_sun(sun)
+        radiance = field.radiance.copy()
+        for lamp in light.lamps:
+            elements = atlas.elements_of(lamp.object_id)
+            # At its edges the surroundings are mixed in.
+            radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
+        field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
+        return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ())
+
     # A mesh whose parts were guessed may lack most of its light, and a sun can be told only once that is known.
-    missing = patches is not None and "missing-light" not in without and is_missing(lit_field, good=reliable, seed=seed)
+    if patches is not None and "missing-light" not in without:
+        found = with_missing_light(
+            dark, lit(light, dark.sun), light, lit_diffuse, reliable, patches, whole, cameras, without, seed
+        )
+        if found is not None:
+            return found
     sun = dark.sun
-    if not missing and sun is None and len(light.received) and "sun" not in without:
+    if sun is None and len(light.received) and "sun" not in without:
         light, sun = with_sun_found(
             unmixed, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
         )
-    field = field.with_mirrors(()).with_sun(sun)
-    radiance = field.radiance.copy()
-    for lamp in light.lamps:
-        elements = atlas.elements_of(lamp.object_id)
-        # At its edges the surroundings are mixed in.
-        radiance[elements[tier[elements] != CLEAN] if lamp.seen else elements] = lamp.radiance
-    field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
-    field = field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ())
-    if not missing or patches is None:
-        return field, light, np.zeros(len(atlas), bool)
-    return with_missing_light(dark, field, light, lit_diffuse, reliable, patches, whole, cameras, without, seed)
+    return lit(light, sun), light, np.zeros(len(atlas), bool)
 
 
 def with_sun_found(
@@ -144,8 +150,8 @@ def with_missing_light(
     cameras: Sequence[Camera],
     without: Collection[str],
     seed: int,
-) -> tuple[LightField, Light, np.ndarray]:
-    """A room that lacks light with that of clipped patches and openings, and a sun's.
+) -> tuple[LightField, Light, np.ndarray] | None:
+    """A room that lacks light with that of clipped patches and openings, and a sun's; None if nothing is missing.
 
     Last, the unseen elements for which it gives the radiance they send ((n,) bool).
 
@@ -169,6 +175,8 @@ def with_missing_light(
     # What is seen through a crack is near, and says nothing of what lies in that direction.
     reflecting = reflecting.with_light(reflecting.radiance, reflecting.environment.shown_in(directions))
     missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
+    if not missing.believed:
+        return None
     lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
     if "sun" in without or dark.sun is not None:
         return lit_field, light_found, missing.shut

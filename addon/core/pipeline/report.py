@@ -8,7 +8,6 @@ import numpy as np
 from ..evidence.tier import tier
 from ..origin import package_of
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
-from ..passes.missing_light.params import MISSING
 from ..passes.registry import following
 from ..scene.visibility import SATURATED
 from .corrected import Corrected
@@ -162,7 +161,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
     names = {instance.object_id: instance.name for instance in run.capture.instances}
     warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
     warnings += [*shading.notes, *([] if sun is None else [sun.note])]
-    if above > MISSING.alarm:
+    if above > 0.05:
         warnings.append(
             f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."

@@ -2,7 +2,6 @@
 
 Most of a room's light may come from there. In a living room as a phone gives it, one ceiling lamp is clipped in every
 frame, the other hangs in a part of the ceiling that no frame saw: the light that was measured is a third of all.
-Nothing is done unless albedos above 1 tell that light is missing.
 """
 
 from dataclasses import dataclass
@@ -44,6 +43,9 @@ class MissingLight:
         Elements of faces that close the mesh and that no frame saw: what they send was solved for like openings.
     sun : (3,) float64
         Times the irradiance of the field's sun: the light that it throws asks for that.
+    spread : (2,) tuple of float
+        Mean deviation of log albedo within planes if openings are as bright as the room and patches as they were
+        measured, and under this light.
     """
 
     lamps: tuple[Lamp, ...]
@@ -53,16 +55,14 @@ class MissingLight:
     environment: Environment
     shut: np.ndarray
     sun: np.ndarray
+    spread: tuple[float, float]
     notes: tuple[str, ...]
 
-
-def is_missing(field: LightField, good: np.ndarray, seed: int) -> bool:
-    """Whether the light of a room, as it was found, is too little for what it reflects."""
-    element = _sample(field, good, seed)
-    if len(element) < LEVELS.many:
-        return False
-    rho = np.pi * field.radiance[element] / np.maximum(irradiance_at(field, element, seed), 1e-12)
-    return float((rho.max(1) > 1).mean()) > MISSING.alarm
+    @property
+    def believed(self) -> bool:
+        """Whether it tells clearly more of what the room reflects than that nothing is missing."""
+        before, after = self.spread
+        return after < (1 - MISSING.gain) * before
 
 
 def find_missing_light(
@@ -155,7 +155,7 @@ def find_missing_light(
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
     notes = (note,) if share >= LEVELS.gain else ()
     sun = radiances[-1] if sunlit.any() else np.ones(3)
-    return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, sun, notes)
+    return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, sun, spread, notes)
 
 
 def _by_sun(field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:

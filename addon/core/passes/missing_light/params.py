@@ -16,9 +16,11 @@ class MissingLightParams:
 
     Attributes
     ----------
-    alarm : float
-        Share of the elements whose albedo would have to be above 1, from which on light is missing: the level at which
-        the report warns.
+    gain : float
+        Share by which it must lower the spread of log albedo within planes to be believed in. In seven rooms with HDR
+        frames and fused meshes it does so by .35, .18 and .11 where the albedo gains or stays, by .04 or less in the
+        four where it loses; in nine phone-made ones by .20 to .59. Albedos above 1 in 5 % of the elements, the
+        criterion before, told of a loss of 6 dB and not of a gain of 6.
     rays : int
         Of each of them into its hemisphere, to find through which cells it sees out.
     merged : int
@@ -53,7 +55,7 @@ class MissingLightParams:
         Times its clipped value, in each channel, that the room's light must ask for of a patch that is called a lamp.
     """
 
-    alarm: float = 0.05
+    gain: float = 0.07
     rays: int = 2048
     merged: int = 2
     sky: float = float(np.radians(30))

@@ -16,7 +16,7 @@ from addon.core.light.openings import CELLS, Openings
 from addon.core.light.sun import Sun
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, measured_patches
-from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing, same_lamps
+from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, same_lamps
 from addon.core.passes.missing_light.params import MISSING
 from addon.core.passes.missing_light.solve import Unknown, solve
 from addon.core.scene.elements import ElementLookup
@@ -164,8 +164,8 @@ def test_a_clipped_lamp_of_the_same_object_gets_its_radiance(seed):
     mesh = patches.mesh(room.mesh)
     apart = replace(room, mesh=mesh)
     field, good = apart.field(measured), np.ones(len(room.atlas), bool)
-    assert is_missing(field, good & ~in_lamp(room), seed)
     found = find_missing_light(field, good, patches.objects, seed)
+    assert found.believed
     assert [lamp.object_id for lamp in found.lamps] == [1]
     assert found.lamps[0].clipped and not found.lamps[0].seen
     assert found.lamps[0].radiance == pytest.approx(LAMP, rel=0.3)
@@ -222,7 +222,7 @@ def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
 
 def test_nothing_is_missing_where_all_light_was_measured():
     room, (_, radiance) = box(), lit()
-    assert not is_missing(room.field(radiance), ~in_lamp(room), 0)
+    assert not find_missing_light(room.field(radiance), ~in_lamp(room), [], 0).believed
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -248,8 +248,8 @@ def test_light_through_a_hole_that_no_frame_saw_is_told_from_what_it_throws():
         1
     ]
     field, good = room.field(radiance[same]), np.ones(len(room.atlas), bool)
-    assert is_missing(field, good, 0)
     found = find_missing_light(field, good, [], 0)
+    assert found.believed
     everything = np.arange(len(room.atlas))
     E = irradiance_at(field.with_openings(found.openings), everything, 0)
     true = irradiance_at(whole.field(radiance), same, 0)
@@ -270,8 +270,8 @@ def test_a_sky_that_every_frame_clips_is_told_from_what_it_throws():
     shown = np.where(up[..., None], np.float32(CLIPPED), np.float32(0.2)) * np.ones(3, np.float32)
     sky = Environment(shown, np.ones((32, 64), np.int32), up)
     field = room.field(radiance[same]).with_light(radiance[same], sky)
-    assert is_missing(field, np.ones(len(room.atlas), bool), 0)
     found = find_missing_light(field, np.ones(len(room.atlas), bool), [], 0)
+    assert found.believed
     assert (found.environment.radiance[~up] == shown[~up]).all()
     everything = np.arange(len(room.atlas))
     E = irradiance_at(field.with_openings(found.openings).with_light(radiance[same], found.environment), everything, 0)
