@@ -23,6 +23,7 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera
 from ..scene.params import VISIBILITY
 from ..scene.visibility import CLEAN, SATURATED
+from ..significance import LEVELS
 from ..weighted import weighted_median
 
 
@@ -151,7 +152,7 @@ def with_missing_light(
     without: Collection[str],
     seed: int,
 ) -> tuple[LightField, Light, np.ndarray] | None:
-    """A room that lacks light with that of clipped patches and openings, and a sun's; None if nothing is missing.
+    """A room that lacks light with that of clipped patches and openings, and a sun's; None if nothing tells of any.
 
     Last, the unseen elements for which it gives the radiance they send ((n,) bool).
 
@@ -170,6 +171,8 @@ def with_missing_light(
     bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
     reflecting = dark.with_mirrors(field.mirrors)
     unknown, reliable = [patch for patch in patches if patch not in measured], good & ~bright
+    if reliable.sum() < LEVELS.many:
+        return None
     median_luminance = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
     windows, directions = looked_out_by(cameras, field.scene, field.environment, median_luminance, *field.outer_box)
     # What is seen through a crack is near, and says nothing of what lies in that direction.

@@ -113,6 +113,21 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     assert np.allclose(np.median(rho[wall], 0), ALBEDO[3], rtol=0.03)
 
 
+def test_a_mesh_without_objects_of_which_frames_saw_next_to_nothing_is_shaded():
+    """Too few elements to tell of missing light."""
+    room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.2)
+    found = measured(room, np.ones((len(room.atlas), 3)))
+    few = np.arange(len(room.atlas)) < 20
+    part = replace(
+        found,
+        radiance=np.where(few[:, None], found.radiance, np.float32(np.nan)),
+        count=np.where(few, found.count, 0).astype(np.int32),
+    )
+    how, whole = Settings(shading_rays=16, threads=2), room.atlas.object_id
+    result = shade(room.surface, room.instances, part, DARK, how, patches=[], whole=whole)
+    assert np.isfinite(result.irradiance).all() and result.openings is None
+
+
 def test_light_on_a_scanned_mesh_is_less_certain_unless_that_is_left_out():
     """A floor that is off by 4 mm from vertex to vertex, 10 cm apart: its triangles face any way by some degrees."""
     room = make_room(split(quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), 20), 0.1)
