@@ -68,9 +68,6 @@ def with_all_light(
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
     light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
-    unmixed = light.without_mixed(field)
-    lamps = [lamp.object_id for lamp in light.lamps]
-    lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
 
     def lit(light: Light, sun: Sun | None) -> LightField:
         field = dark.with_sun(sun)
@@ -91,6 +88,9 @@ def with_all_light(
             return found
     sun = dark.sun
     if sun is None and len(light.received) and "sun" not in without:
+        unmixed = light.without_mixed(field)
+        lamps = [lamp.object_id for lamp in light.lamps]
+        lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
         light, sun = with_sun_found(
             unmixed, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
         )
