@@ -54,13 +54,13 @@ ON_BOTH = ("tests/core/io/", "tests/core/results/")
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what is slow by its fixtures, and as `arithmetic` what is slow and depends on nothing but that."""
+    """Mark what is slow by its fixtures, and as `arithmetic` what depends on nothing but that."""
     for item in items:
         place = item.path.relative_to(ROOT).as_posix()
         if SLOW_FIXTURES & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.slow)
-        slow = place.startswith("tests/core/") and not place.startswith(ON_BOTH) and item.get_closest_marker("slow")
-        if slow or place.startswith("tests/hard_cases/"):
+        of_core = place.startswith(("tests/core/", "tests/hard_cases/")) and not place.startswith(ON_BOTH)
+        if of_core and not item.get_closest_marker("once"):  # that one is left out where this is done
             item.add_marker(pytest.mark.arithmetic)
 
 

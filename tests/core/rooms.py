@@ -213,15 +213,16 @@ def pixels_of(image: np.ndarray, valid=None, saturated=None) -> Pixels:
 def polygon_irradiance(points: np.ndarray, normals: np.ndarray, quads: list[Quad]) -> np.ndarray:
     """E at `points` from each quad at radiance 1, wholly above their horizon (Lambert's formula): (n, q) float64."""
     result = np.zeros((len(points), len(quads)))
+    x, n = points.T.copy(), normals.T.copy()  # three long rows are quicker than n short ones
     for j, q in enumerate(quads):
         corners = [q.corner, q.corner + q.edge_u, q.corner + q.edge_u + q.edge_v, q.corner + q.edge_v]
-        way = [c - points for c in corners]
-        way = [w / np.maximum(np.linalg.norm(w, axis=1, keepdims=True), 1e-12) for w in way]
+        way = [np.asarray(c)[:, None] - x for c in corners]
+        way = [w / np.maximum(np.sqrt((w * w).sum(0)), 1e-12) for w in way]
         for a, b in zip(way, way[1:] + way[:1]):
-            cross = np.cross(a, b)
-            sine = np.linalg.norm(cross, axis=1)
-            angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
-            result[:, j] += angle / np.maximum(sine, 1e-12) * np.einsum("ij,ij->i", cross, normals) / 2
+            cross = np.stack([a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))])
+            sine = np.sqrt((cross * cross).sum(0))
+            angle = np.arctan2(sine, (a * b).sum(0))
+            result[:, j] += angle / np.maximum(sine, 1e-12) * (cross * n).sum(0) / 2
     return np.abs(result)
 
 
