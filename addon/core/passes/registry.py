@@ -77,6 +77,7 @@ PASSES = (
         unseen_lamps="Solves for lamps that no frame sees.",
         unseen_sky="Solves for the parts of the sky that no frame sees.",
         whole_sky="Solves for the sky where no frame sees any of it.",
+        joint_light="Solves once more for the lamps and skies that were found, together, by what albedo is plausible.",
         missing_light="Solves for clipped patches, and for what comes in by openings of a mesh without objects.",
         sun="Solves for a sun that no frame sees from the patch of light that it makes.",
         clipped_sunlight="Lets a patch of sun that frames clip send what the albedo around it makes of the sun.",

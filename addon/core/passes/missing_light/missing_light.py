@@ -13,6 +13,7 @@ from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
 from ...light.few_elements import filled_radiance, from_sun, irradiance_at, spread_over
 from ...light.field import LightField
+from ...light.joint_fit import Unknown, in_one_plane, solve
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
 from ...light.params import GATHER
@@ -22,7 +23,6 @@ from ...scene.atlas import Atlas
 from ...scene.params import COPLANAR
 from ...significance import LEVELS
 from .params import MISSING
-from .solve import Unknown, in_one_plane, solve
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,16 @@
 """Lamps that nobody saw shine, found one by one from what they throw, and the sky beside them."""
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
+from ...light.joint_fit import Unknown, in_one_plane, solve
 from ...light.lamps import Lamp, LampKinds
 from ...light.light_fit import Sample, log_of
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
+from ...scene.atlas import Atlas
 from .params import UNSEEN
 from .sky import Sky, all_light
 
@@ -99,8 +102,7 @@ def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
     """
     for i, G in enumerate(sky.contribution):
         others = all_light(base, lamps, contribution, sky, without=i)
-        likely = sky.bounds(i)[1] if sky.clipped[i] else sky.guess[i]
-        if (G[:, None] * likely).mean() < SKY.least_share * others.mean():
+        if not _tells(sky, i, others):
             continue
         bounds = np.transpose(sky.bounds(i))
         solutions = [
@@ -114,6 +116,43 @@ def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
             sky.solved.discard(i)
         else:
             sky.solved.add(i)
+
+
+def _tells(sky: Sky, i: int, others: np.ndarray) -> bool:
+    """Whether a part of the sky may light enough of the room, beside what others give ((m, 3)), to be solved for."""
+    likely = sky.bounds(i)[1] if sky.clipped[i] else sky.guess[i]
+    return bool((sky.contribution[i][:, None] * likely).mean() >= SKY.least_share * others.mean())
+
+
+def solve_together(
+    sample: Sample, atlas: Atlas, lamps: list[Lamp], contribution, sky: Sky, base: np.ndarray, seed: int
+) -> tuple[list[Lamp], Sky]:
+    """The radiances of lamps and sky that were found, solved for once more by what albedo is plausible (`joint_fit`).
+
+    By the spread within objects alone they come out too dark where most of the light is unknown. A lamp that shines as
+    a seen one does keeps its radiance.
+    """
+    free, kept = ([lamp for lamp in lamps if (lamp.twin is None) == unknown] for unknown in (True, False))
+    light = all_light(base, lamps, contribution, sky)
+    parts = [i for i in range(len(sky.contribution)) if _tells(sky, i, light)]
+    if not free and not parts:
+        return lamps, sky
+    bounds = [sky.bounds(i) for i in parts]
+    by_white = np.stack([*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], 1)
+    unknown = Unknown(
+        by_white,
+        np.zeros((len(base), 0, 3)),
+        np.stack([*(np.full(3, 1e-6) for _ in free), *(low for low, _ in bounds)]),
+        np.stack([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)]),
+    )
+    known = all_light(base, kept, contribution, sky.without(parts))
+    position, normal = atlas.position[sample.element], atlas.normal[sample.element]
+    radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed))
+    solved = [replace(lamp, radiance=s.astype(np.float32)) for lamp, s in zip(free, radiance[: len(free)], strict=True)]
+    for i, (low, high), s in zip(parts, bounds, radiance[len(free) :], strict=True):
+        sky.radiance[i] = np.clip(s, low, high)
+        sky.solved.add(i)
+    return solved + kept, sky
 
 
 def _best_radiance(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:

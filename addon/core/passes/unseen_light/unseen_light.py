@@ -21,7 +21,7 @@ from ...luminance import LUMINANCE
 from ...significance import LEVELS
 from .params import UNSEEN
 from .sky import Sky, all_light
-from .unseen_lamps import needed, solve_lamps, solve_sky
+from .unseen_lamps import needed, solve_lamps, solve_sky, solve_together
 from .whole_sky import with_whole_sky
 
 
@@ -191,6 +191,8 @@ def find_light(
         lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received)
         solve_sky(sample, lamps, contribution, sky, received)
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
+    if "joint-light" not in without:
+        lamps, sky = solve_together(sample, atlas, lamps, contribution, sky, received, seed)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps

@@ -18,7 +18,6 @@ from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, measured_patches
 from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, same_lamps
 from addon.core.passes.missing_light.params import MISSING
-from addon.core.passes.missing_light.solve import Unknown, solve
 from addon.core.scene.elements import ElementLookup
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.patches import Patches
@@ -207,19 +206,6 @@ def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
     assert not found.lamps
 
 
-def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
-    """Beside a lamp, as an edge that is off leaves them: one in 200 would need an albedo of a hundred."""
-    rng, m = np.random.default_rng(0), 2000
-    through, far = rng.uniform(0, 0.1, (m, 1)), rng.choice(m, m // 200, replace=False)
-    received = np.ones((m, 3))
-    sent = 0.5 / np.pi * (received + 20 * through)
-    sent[far] *= 200
-    unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.ones((1, 3)))
-    pairs = rng.integers(0, m, (8 * m, 2))
-    (found,), _ = solve(sent, received, unknown, pairs)
-    assert found == pytest.approx(20, rel=0.3)
-
-
 def test_nothing_is_missing_where_all_light_was_measured():
     room, (_, radiance) = box(), lit()
     assert not find_missing_light(room.field(radiance), ~in_lamp(room), [], 0).believed
@@ -319,13 +305,6 @@ def test_a_sun_of_which_frames_show_a_lower_bound_is_told_from_what_it_throws(to
     found = find_missing_light(field, ~sunlit, [], 0, sunlit=sunlit)
     assert (np.abs(np.log(told * found.sun)) < 0.8 * np.abs(np.log(told))).all()
     assert find_missing_light(field, ~sunlit, [], 0).sun == pytest.approx(np.ones(3))
-
-
-def test_where_nothing_is_unknown_nothing_is_solved_for():
-    none = Unknown(np.zeros((40, 0)), np.zeros((40, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
-    pairs = np.arange(40).reshape(-1, 2)
-    found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
-    assert found.shape == (0, 3) and spread == (0, 0)
 
 
 def test_light_by_a_hole_that_a_mirror_shows_counts():

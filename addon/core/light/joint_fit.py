@@ -1,4 +1,4 @@
-"""The radiances of unknown sources under which the albedo of a scan without objects is most plausible.
+"""The radiances of unknown sources, all together, under which albedo is most plausible.
 
 With E = E0 + sum s_k G_k, log albedo a = log(pi L_d / E) is to be alike where the surface is of one plane, which is
 robust against edges of paint (Land and McCann's Retinex in three dimensions), to be near a usual albedo, and not above
@@ -13,10 +13,10 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ...brdf.lambertian import TYPICAL_ALBEDO
-from ...scene.params import COPLANAR
-from ...significance import LEVELS
-from .params import MISSING
+from ..brdf.lambertian import TYPICAL_ALBEDO
+from ..scene.params import COPLANAR
+from ..significance import LEVELS
+from .params import JOINT_FIT
 
 
 def in_one_plane(position: np.ndarray, normal: np.ndarray, seed: int) -> np.ndarray:
@@ -87,30 +87,32 @@ class _NegativeLogPosterior:
         radiance = np.exp(x)
         E = self._received + self._unknown.irradiance(radiance)
         a = self._sent - np.log(E)
-        difference = self._difference @ a / MISSING.apart
+        difference = self._difference @ a / JOINT_FIT.apart
         value = 0.5 * float(np.log1p(difference**2).sum()) / max(len(difference), 1)
         grad_a = (
-            self._difference_transposed @ (difference / (1 + difference**2)) / (MISSING.apart * max(len(difference), 1))
+            self._difference_transposed
+            @ (difference / (1 + difference**2))
+            / (JOINT_FIT.apart * max(len(difference), 1))
         )
-        offset = (a.mean(1) - np.log(TYPICAL_ALBEDO)) / MISSING.deviation
-        value += MISSING.level * 0.5 * float((offset**2).mean())
-        grad_a += (MISSING.level / (MISSING.deviation * channels * m) * offset)[:, None]
+        offset = (a.mean(1) - np.log(TYPICAL_ALBEDO)) / JOINT_FIT.deviation
+        value += JOINT_FIT.level * 0.5 * float((offset**2).mean())
+        grad_a += (JOINT_FIT.level / (JOINT_FIT.deviation * channels * m) * offset)[:, None]
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
-        excess = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
+        excess = np.maximum(a - np.log(JOINT_FIT.highest), 0) / 0.1
         root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)
         value += LEVELS.sigmas**2 * float((root - 1).mean())
         grad_a += excess / root / (0.1 * channels * m)
         gradient = -self._unknown.transposed(grad_a / E) * radiance
         deviation = x - self.expected
-        level = deviation.mean(1, keepdims=True) / MISSING.unlike
-        tint = (deviation - deviation.mean(1, keepdims=True)) / MISSING.tint
+        level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
+        tint = (deviation - deviation.mean(1, keepdims=True)) / JOINT_FIT.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
-        weight = MISSING.sources * channels / k
+        weight = JOINT_FIT.sources * channels / k
         of_level = np.full((k, 1), weight)
-        of_level[self._unknown.contribution.shape[1] :] = MISSING.sources * channels
+        of_level[self._unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
         value += float((of_level * np.log1p(level**2)).sum() + weight * np.log(coloured).sum())
-        gradient += 2 * of_level * level / (channels * MISSING.unlike * (1 + level**2))
-        gradient += 2 * weight * tint / (MISSING.tint * coloured)
+        gradient += 2 * of_level * level / (channels * JOINT_FIT.unlike * (1 + level**2))
+        gradient += 2 * weight * tint / (JOINT_FIT.tint * coloured)
         return value, gradient.ravel()
 
 
@@ -134,7 +136,7 @@ def solve(
     """
     cost = _NegativeLogPosterior(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.lower, 1e-6))
-    start = cost.expected + np.log(MISSING.start)
+    start = cost.expected + np.log(JOINT_FIT.start)
     log_radiance = low  # of a closed mesh without clipped patches nothing is unknown
     if low.size:
         log_radiance = minimize(

@@ -1,0 +1,26 @@
+"""Unknown sources solved for together, by what albedo is plausible."""
+
+import numpy as np
+import pytest
+
+from addon.core.light.joint_fit import Unknown, solve
+
+
+def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
+    """Beside a lamp, as an edge that is off leaves them: one in 200 would need an albedo of a hundred."""
+    rng, m = np.random.default_rng(0), 2000
+    through, far = rng.uniform(0, 0.1, (m, 1)), rng.choice(m, m // 200, replace=False)
+    received = np.ones((m, 3))
+    sent = 0.5 / np.pi * (received + 20 * through)
+    sent[far] *= 200
+    unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.ones((1, 3)))
+    pairs = rng.integers(0, m, (8 * m, 2))
+    (found,), _ = solve(sent, received, unknown, pairs)
+    assert found == pytest.approx(20, rel=0.3)
+
+
+def test_where_nothing_is_unknown_nothing_is_solved_for():
+    none = Unknown(np.zeros((40, 0)), np.zeros((40, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
+    pairs = np.arange(40).reshape(-1, 2)
+    found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
+    assert found.shape == (0, 3) and spread == (0, 0)
