@@ -161,8 +161,8 @@ class JointFitParams:
         The greatest albedo of usual paint. What is above it counts in tenths of log albedo, by the square up to
         `LEVELS.sigmas` of them and linearly beyond (pseudo-Huber).
     sources : float
-        Weight of the prior that an opening shows daylight as bright as the room, and a patch its clipped value: a lamp
-        is an exception (Student's t).
+        Weight of the prior that a source is as bright as expected: an opening shows daylight as bright as the room, a
+        patch its clipped value, and a lamp is an exception (Student's t).
     unlike : float
         Its scale, in log radiance, of all channels together.
     tint : float
