@@ -191,7 +191,7 @@ def find_light(
         lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received)
         solve_sky(sample, lamps, contribution, sky, received)
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
-    if "plausible-light" not in without:
+    if "plausible-light" not in without and (certain or any(sky.clipped)):
         lamps, sky = solve_together(sample, atlas, lamps, contribution, sky, received, seed)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
