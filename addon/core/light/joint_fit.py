@@ -141,7 +141,8 @@ def solve(
     if low.size:
         log_radiance = minimize(
             cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
-            bounds=[(bound, 12.0) for bound in low.ravel()], options={"maxiter": LEVELS.steps},
+            bounds=np.stack([low, np.maximum(cost.expected, low) + 12], -1).reshape(-1, 2),
+            options={"maxiter": LEVELS.steps},
         ).x.reshape(low.shape)  # fmt: skip
 
     def spread(x: np.ndarray) -> float:

@@ -24,3 +24,14 @@ def test_where_nothing_is_unknown_nothing_is_solved_for():
     pairs = np.arange(40).reshape(-1, 2)
     found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
     assert found.shape == (0, 3) and spread == (0, 0)
+
+
+def test_any_unit_of_radiance_does():
+    rng, m = np.random.default_rng(1), 500
+    through = rng.uniform(0, 0.1, (m, 1))
+    sent = 0.5 / np.pi * (1 + 20 * through) * np.ones(3)
+    pairs = rng.integers(0, m, (8 * m, 2))
+    for unit in (1, 1e6):
+        unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), float(unit)))
+        (found,), _ = solve(unit * sent, np.full((m, 3), float(unit)), unknown, pairs)
+        assert found == pytest.approx(20 * unit, rel=0.1)
