@@ -47,7 +47,7 @@ class Unknown:
     lower : (k + s, 3) float64
         Lower bounds of radiances and factor.
     expected : (k + s, 3) float64
-        Radiances as they are expected, and 1. As the sun was measured, its level has a prior of the full weight.
+        Radiances that the prior expects, and 1. As the sun was measured, its level has a prior of the full weight.
     """
 
     contribution: np.ndarray

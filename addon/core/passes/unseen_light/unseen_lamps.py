@@ -126,23 +126,24 @@ def _tells(sky: Sky, i: int, others: np.ndarray) -> bool:
 
 def solve_together(
     sample: Sample, atlas: Atlas, lamps: list[Lamp], contribution, sky: Sky, base: np.ndarray, seed: int
-) -> tuple[list[Lamp], Sky]:
-    """The radiances of lamps and sky that were found, solved for once more by what albedo is plausible (`joint_fit`).
+) -> list[Lamp]:
+    """Lamps, and in place the sky, solved for once more by what albedo is plausible (`joint_fit`).
 
     By the spread within objects alone they come out too dark where most of the light is unknown. A lamp that shines as
     a seen one does keeps its radiance.
     """
-    free, kept = ([lamp for lamp in lamps if (lamp.twin is None) == unknown] for unknown in (True, False))
+    free = [lamp for lamp in lamps if lamp.twin is None]
+    kept = [lamp for lamp in lamps if lamp.twin is not None]
     light = all_light(base, lamps, contribution, sky)
     parts = [i for i in range(len(sky.contribution)) if _tells(sky, i, light)]
     if not free and not parts:
-        return lamps, sky
+        return lamps
     bounds = [sky.bounds(i) for i in parts]
     by_white = np.stack([*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], 1)
     unknown = Unknown(
         by_white,
         np.zeros((len(base), 0, 3)),
-        np.stack([*(np.full(3, 1e-6) for _ in free), *(low for low, _ in bounds)]),
+        np.stack([*(np.zeros(3) for _ in free), *(low for low, _ in bounds)]),
         np.stack([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)]),
     )
     known = all_light(base, kept, contribution, sky.without(parts))
@@ -152,7 +153,7 @@ def solve_together(
     for i, (low, high), s in zip(parts, bounds, radiance[len(free) :], strict=True):
         sky.radiance[i] = np.clip(s, low, high)
         sky.solved.add(i)
-    return solved + kept, sky
+    return solved + kept
 
 
 def _best_radiance(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:

@@ -192,7 +192,7 @@ def find_light(
         solve_sky(sample, lamps, contribution, sky, received)
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
     if "plausible-light" not in without and (certain or any(sky.clipped)):
-        lamps, sky = solve_together(sample, atlas, lamps, contribution, sky, received, seed)
+        lamps = solve_together(sample, atlas, lamps, contribution, sky, received, seed)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps

@@ -25,7 +25,7 @@ def solved(told: float, share: float = 0.5, lower: float = 0.1) -> tuple[list[La
     lamps = [Lamp(1, told * LAMP, False), Lamp(2, TWIN, False, twin=5)]
     sky = Sky([at_sky], [lower * SKY], [True], [True])
     sky.radiance = [np.maximum(told, lower) * SKY]
-    return solve_together(sample, room.atlas, lamps, {1: at_lamp, 2: at_twin}, sky, base, 0)
+    return solve_together(sample, room.atlas, lamps, {1: at_lamp, 2: at_twin}, sky, base, 0), sky
 
 
 @pytest.mark.parametrize("told", [0.6, 1.0, 1.6])
@@ -50,4 +50,5 @@ def test_where_nothing_is_unknown_all_stays():
     sample = Sample(np.arange(4), np.zeros(4, int), np.ones((4, 3)), np.ones((4, 3)))
     twin, sky = Lamp(2, TWIN, False, twin=5), Sky([], [], [], [])
     room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0)], 0.5)
-    assert solve_together(sample, room.atlas, [twin], {2: np.ones(4)}, sky, np.ones((4, 3)), 0) == ([twin], sky)
+    assert solve_together(sample, room.atlas, [twin], {2: np.ones(4)}, sky, np.ones((4, 3)), 0) == [twin]
+    assert not sky.solved
