@@ -4,9 +4,8 @@ A fused mesh has a mirror in its wall's plane, or as a flat piece before it or i
 chimney and its sides, every direction that much of it faces is tried. Each observed element is tested together with
 those around it for showing the mirrored room, as `flat_mirrors` tests an object. A piece is a mirror if most of its
 elements do: two mirrors of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at
-most .11. A region of a larger piece is one if the mirrored room explains what it shows: it leaves .09 to .24 of the
-variance in the mirrors of six rooms, and .35 to .9 in some sixty regions of worktops and fronts, of walls under a lamp
-and of curtains, in thirteen.
+most .11. A region of a larger piece is one if the mirrored room explains what it shows, by the same measure as a
+flat object: DEVIATIONS
 """
 
 from collections.abc import Iterator
@@ -16,12 +15,14 @@ from scipy.spatial import Delaunay, cKDTree
 
 from ...groups import by_number
 from ...light.field import FLAT, LightField
+from ...scene.closing import plane_axes
 from ...scene.connected_parts import weld
+from ...scene.params import COPLANAR
 from ...scene.patches import Patches
 from ...scene.samples import Samples
 from ...scene.uv_islands import components, connected
 from ...significance import LEVELS
-from .mirrored import Views, tangents_of
+from .mirrored import Views
 from .params import MIRRORS
 
 
@@ -41,10 +42,13 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     for object_id, index in by_number(atlas.object_id[samples.element[clear]]).items():
         observations, free = clear[index], mesh.object_id == object_id
         for normal in _facings(atlas.normal[np.unique(samples.element[observations])]):
-            flat = np.flatnonzero(free & (normals @ normal > FLAT))
+            flat, level = (
+                np.flatnonzero(free & (normals @ normal > cosine)) for cosine in (FLAT, np.cos(COPLANAR.turn))
+            )
             free[flat] = False  # none is of two pieces
             facing = observations[atlas.normal[samples.element[observations]] @ normal > FLAT]
-            element, mirrored, unexplained, log_f0 = _mirrored(Views.of(field, samples, facing), normal)
+            views = Views.of(field, samples, facing)
+            element, mirrored, log_f0 = _mirrored(views, normal)
             if mirrored.sum() < LEVELS.enough:
                 continue
             piece = np.full(len(mesh.triangles), -1)
@@ -52,11 +56,13 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
             within = piece[atlas.triangle[element]]
             whole = _mirroring(within, mirrored)
             rest = mirrored & ~np.isin(within, whole)
-            middle, position = mesh.vertices[mesh.triangles[flat]].mean(1), atlas.position[element]
-            regions = _regions_in(middle, position, rest, unexplained, log_f0, normal, atlas.texel_edge)
-            for chosen in (*(piece[flat] == label for label in whole), *regions):
-                triangle = flat[chosen].astype(np.int32)
-                count = len(triangle)
+            # What noise has turned within a region is of it.
+            level = level[~np.isin(piece[level], whole)]
+            middle = mesh.vertices[mesh.triangles[level]].mean(1)
+            regions = [level[chosen] for chosen in _regions_in(middle, views, element, rest, log_f0, normal)]
+            for triangle in (*(flat[piece[flat] == label] for label in whole), *regions):
+                free[triangle] = False
+                triangle, count = triangle.astype(np.int32), len(triangle)
                 patches.append(Patches(triangle, np.full(count, next_id, np.int32), np.array([next_id], np.int32)))
                 next_id += 1
     return Patches.together(patches)
@@ -83,31 +89,34 @@ def _mirroring(within: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
 
 
 def _regions_in(
-    middle: np.ndarray,
-    position: np.ndarray,
-    mirrored: np.ndarray,
-    unexplained: np.ndarray,
-    log_f0: np.ndarray,
-    normal: np.ndarray,
-    margin: float,
+    middle: np.ndarray, views: Views, element: np.ndarray, mirrored: np.ndarray, log_f0: np.ndarray, normal: np.ndarray
 ) -> list[np.ndarray]:
     """Triangles ((t,) bool, by the `middle` of each) in regions that are mirrors, each in one."""
-    count = len(position)
+    position, margin, count = views.field.atlas.position[element], views.field.atlas.texel_edge, len(element)
     neighbours = cKDTree(position).query(position, k=min(LEVELS.neighbours, count))[1].reshape(count, -1)
     region = _connected(mirrored[neighbours].mean(1) > 0.5, neighbours)
-    tangents, taken, parts = tangents_of(normal), np.zeros(len(middle), bool), []
+    axes, taken, parts = np.stack(plane_axes(normal, [])), np.zeros(len(middle), bool), []
     for label in range(region.max() + 1):
         inside = region == label
-        if inside.sum() < LEVELS.enough or np.median(unexplained[inside]) > MIRRORS.unexplained:
+        if inside.sum() < LEVELS.enough:
+            continue
+        of_region = views.part(np.flatnonzero(np.isin(views.element, element[inside])))
+        deviation, own_deviation, _, f0 = of_region.compare(normal, LEVELS.enough)
+        if deviation > MIRRORS.unexplained * own_deviation or not MIRRORS.least_f0 < f0.mean() < MIRRORS.most_f0:
             continue
         # Where it mirrors an even wall nothing varies that would tell; its F0 does.
-        deviation = np.minimum(np.abs(log_f0 - np.median(log_f0[inside])), MIRRORS.stray)[neighbours].mean(1)
-        grown = _connected(inside | (deviation < np.median(deviation[inside])), neighbours)
+        stray = np.minimum(np.abs(log_f0 - np.median(log_f0[inside])), MIRRORS.stray)[neighbours].mean(1)
+        grown = _connected(inside | (stray < np.median(stray[inside])), neighbours)
         inside = grown == grown[inside][0]
         # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
-        hull, depth = Delaunay(position[inside] @ tangents.T, qhull_options="QJ"), position[inside] @ normal
+        hull, depth = Delaunay(position[inside] @ axes.T, qhull_options="QJ"), position[inside] @ normal
         chosen = (middle @ normal > depth.min() - margin) & (middle @ normal < depth.max() + margin) & ~taken
-        chosen &= hull.find_simplex(middle @ tangents.T) >= 0
+        # Most are rectangles: of one, no view of its corners tells that they are something else.
+        low, high = (limit(position[inside] @ axes.T, 0) for limit in (np.min, np.max))
+        in_box, of_box = (((x @ axes.T > low) & (x @ axes.T < high)).all(1) for x in (position, middle))
+        corners = in_box & (hull.find_simplex(position @ axes.T) < 0)
+        whole = corners.sum() < LEVELS.few or np.median(stray[corners]) < LEVELS.likely * np.median(stray[inside])
+        chosen &= of_box if whole else hull.find_simplex(middle @ axes.T) >= 0
         taken |= chosen
         if chosen.any():
             parts.append(chosen)
@@ -124,14 +133,14 @@ def _connected(inside: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     return region
 
 
-def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Elements ((k,) int) whose mirrored radiance is known, and around which a mirror surely explains it, (k,) bool.
 
-    Then the share of the variance around them that it leaves, and the logarithm of their F0 as mirrors, (k,) each.
+    Then the logarithm of their F0 as mirrors, (k,).
     """
     views_known = views.known(normal)
     if views_known is None:
-        return np.zeros(0, int), np.zeros(0, bool), np.zeros(0), np.zeros(0)
+        return np.zeros(0, int), np.zeros(0, bool), np.zeros(0)
     index, _, observed, predicted = views_known
     element, group, count = np.unique(views.element[index], return_inverse=True, return_counts=True)
     position = views.field.atlas.position[element]
@@ -148,7 +157,10 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     f0 = np.median(log_f0[neighbours], 1)
     variance = around(a * a)
     correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
-    unexplained = around((observed - predicted - f0[group]) ** 2) / np.maximum(variance, 1e-12)
+    residual = np.where(
+        (count > 1)[group], observed - predicted - f0[group], 0
+    )  # one view of an element has no variance
+    unexplained = around(residual**2) / np.maximum(variance, 1e-12)
     possible = (f0 > np.log(MIRRORS.least_f0)) & (f0 < np.log(MIRRORS.most_f0))
     mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & possible
-    return element, mirrored, unexplained, log_f0
+    return element, mirrored, log_f0

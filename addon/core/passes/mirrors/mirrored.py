@@ -50,15 +50,17 @@ class Views:
         """The observations at `index`."""
         return Views(self.field, *(getattr(self, k)[index] for k in ("element", "origin", "direction", "radiance")))
 
-    def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    def known(
+        self, normals: np.ndarray, least: int = LEVELS.many
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """Observations ((k,) int) whose mirrored direction is known under `normals`, the radiance from there ((k, 3)),
-        and the logarithms of the observed and of the predicted radiance, (k,) each."""
+        and the logarithms of the observed and of the predicted radiance, (k,) each; None if there are fewer."""
         twice_cosine = (
             2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         )
         predicted = self.field.along(self.origin, (twice_cosine * normals - self.direction).astype(np.float32))[0]
         known = np.flatnonzero(predicted.mean(1) > DARK)
-        if len(known) < LEVELS.many:
+        if len(known) < least:
             return None
         observed, predicted = self.radiance[known], predicted[known]
         return known, predicted, *(np.log(np.maximum(x.mean(1), DARK)) for x in (observed, predicted))
@@ -72,27 +74,31 @@ class Views:
         # Beside an edge a ray of a slightly different direction meets another surface altogether.
         return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.stray).mean())
 
-    def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
-        """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen.
+    def compare(self, normals: np.ndarray, least: int = LEVELS.many) -> tuple[float, float, float, np.ndarray]:
+        """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen; `least` as in `known`.
 
         Returns
         -------
         deviation, own_deviation : float
-            Median absolute deviation of log radiance from the mirrored room, and from the elements' own means.
+            Median absolute deviation of log radiance from the mirrored room, and from the elements' own means: of
+            elements seen more than once, as others have no deviation.
         correlation : float
             Of what was seen with the mirrored room, within the elements.
         f0 : (3,) float
         """
-        result = self.known(normals)
+        result = self.known(normals, least)
         if result is None:
             return np.inf, 0.0, 0.0, np.zeros(3)
         known, predicted, a, b = result
         _, group, count = np.unique(self.element[known], return_inverse=True, return_counts=True)
         centred_a, centred_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
         correlation = float(np.mean(centred_a * centred_b) / max(centred_a.std() * centred_b.std(), 1e-12))
-        deviation = float(np.median(np.abs(a - b - np.median(a - b))))
         f0 = np.median(self.radiance[known] / np.maximum(predicted, DARK), 0)
-        return deviation, float(np.median(np.abs(centred_a))), correlation, f0
+        several = (count > 1)[group]
+        if several.sum() < LEVELS.enough:
+            return np.inf, 0.0, correlation, f0
+        deviation = float(np.median(np.abs(a - b - np.median(a - b))[several]))
+        return deviation, float(np.median(np.abs(centred_a)[several])), correlation, f0
 
 
 def tangents_of(normal: np.ndarray) -> np.ndarray:

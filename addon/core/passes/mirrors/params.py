@@ -16,8 +16,8 @@ class MirrorsParams:
     together : float
         Least correlation, within the elements, of what they show and of what a mirror would.
     unexplained : float
-        Most of the variance of what a region shows, in the median over its elements, that a mirror there may not
-        explain (`mirror_patches`).
+        Most of a region's deviation from its elements' own means that is left from the mirrored room
+        (`mirror_patches`).
     least_f0 : float
         A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
     most_f0 : float

@@ -48,6 +48,17 @@ def test_a_mirror(box):
     assert np.degrees(np.arccos(min(mirror.normal[2], 1))) < 0.2
 
 
+def test_a_mirror_of_which_most_is_seen_once(box):
+    """What was seen once has no deviation from its own mean, and is no sign against a mirror."""
+    samples = frames(box, SILVER)
+    again = np.arange(len(samples.element)) % 10
+    kept = (again == 0) | ((again < 3) & (np.arange(len(again)) // 10 % 5 == 0))
+    count = np.bincount(samples.element[kept])
+    assert (count == 1).sum() > count[count > 1].sum()
+    (mirror,) = find_mirrors(box.field, (), Samples(*(getattr(samples, f.name)[kept] for f in fields(Samples))), FLOOR)
+    np.testing.assert_allclose(mirror.f0, SILVER, rtol=0.1)
+
+
 def test_the_plane_of_a_scan_is_put_right(box):
     """The mesh is off by half a degree: what is mirrored says how the mirror hangs."""
     (mirror,) = find_mirrors(box.field, (), frames(box, SILVER, tilt=np.radians(0.5)), FLOOR)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -35,11 +35,17 @@ def box():
     return with_mirror(ABOVE)
 
 
-def frames(box, f0, diffuse=0.3, noise=0.05, below=0.0):
+def in_ellipse(points: np.ndarray) -> np.ndarray:
+    """Whether points of the floor ((n, 2)) lie in the ellipse that touches the mirror's edges."""
+    return (((points - (LOW + HIGH) / 2) / (HIGH - LOW) * 2) ** 2).sum(1) < 1
+
+
+def frames(box, f0, diffuse=0.3, noise=0.05, below=0.0, round_mirror=False):
     """The floor's samples: diffuse, with a mirror in its middle, `below` which as much is scattered."""
     element, direction, frame = box.views(900, 10)
     origin = box.room.atlas.position[element].astype(float) + [0, 0, 1e-6]
     inside = ((origin[:, :2] > LOW) & (origin[:, :2] < HIGH)).all(1)
+    inside &= in_ellipse(origin[:, :2]) | (not round_mirror)
     shown = box.arriving(origin, np.array([-1, -1, 1]) * direction)
     seen = np.where(inside[:, None], below + f0 * shown, diffuse)
     seen = seen * np.exp(np.random.default_rng(0).normal(0, noise, seen.shape))
@@ -90,6 +96,38 @@ def test_a_mirror_in_the_plane_of_its_floor():
     corners = box.room.mesh.vertices[box.room.mesh.triangles[patches.triangle]][..., :2]
     assert (corners > LOW - 1e-4).all() and (corners < HIGH + 1e-4).all()
     assert len(corners) == 2
+
+
+@pytest.fixture(scope="module")
+def tiled():
+    """A floor of one part and of many triangles."""
+    box = Box()
+    floor, *others = lit_box(tuple(SIZE))
+    tiles = [cut(floor, (i / 40, (i + 1) / 40), (j / 30, (j + 1) / 30)) for i in range(40) for j in range(30)]
+    box.room = make_room([*tiles, *others], 0.05)
+    return box
+
+
+def area_of(box, patches) -> float:
+    return float(box.room.mesh.geometry[1][patches.triangle].sum())
+
+
+def test_corners_that_no_view_shows(tiled):
+    """A mirror is taken for a rectangle where nothing tells otherwise."""
+    samples = frames(tiled, 0.85)
+    place = tiled.room.atlas.position[samples.element][:, :2]
+    in_corner = ((place > LOW) & (place < HIGH)).all(1) & ~in_ellipse(place)
+    samples = Samples(*(getattr(samples, field.name)[~in_corner] for field in fields(Samples)))
+    patches = mirror_patches(tiled.field, samples)
+    assert len(patches.mirrors) == 1
+    assert area_of(tiled, patches) == pytest.approx(np.prod(HIGH - LOW), rel=0.1)
+
+
+def test_a_round_mirror(tiled):
+    patches = mirror_patches(tiled.field, frames(tiled, 0.85, diffuse=0.05, round_mirror=True))
+    assert len(patches.mirrors) == 1
+    ellipse = np.pi / 4 * np.prod(HIGH - LOW)
+    assert 0.65 * ellipse < area_of(tiled, patches) < 1.05 * ellipse
 
 
 @pytest.mark.parametrize("f0", [0.06, 0.2])
