@@ -11,8 +11,8 @@ from ...core.results.room_file import material
 from ..custom_properties import IMAGE, RESULT, UV_MAP, set_run
 from ..data.images import tiles_of
 from ..data.instances import chosen_in, name_of, slots_of
-from ..data.materials import dress
-from ..data.mesh_objects import is_open
+from ..data.materials import dress, shines_to_the_front
+from ..data.mesh_objects import is_one_sided
 from ..light import lamps
 from ..refused import refused, sentences
 from ..results import changes, file
@@ -119,7 +119,8 @@ def _dress(obj: bpy.types.Object, object_id: int, entry: dict, image: bpy.types.
     state = lamps.snapshot(worn) if lamps.is_lamp(worn) else None
     if state is not None:
         lamps.restore(worn)
-    dress(worn, description, image, one_sided=description.model.gives_light and is_open(obj.data))
+    one_sided = shines_to_the_front(worn) if state is not None else is_one_sided(obj.data, False)
+    dress(worn, description, image, one_sided=description.model.gives_light and one_sided)
     stamp_tree(worn, anew=True)
     if state is not None and description.model.gives_light:
         lamps.put_back(worn, state)

@@ -91,6 +91,11 @@ def dress(
     return material
 
 
+def shines_to_the_front(material: bpy.types.Material) -> bool:
+    """Whether a lamp's material was made `one_sided`."""
+    return find_node(material, "NEW_GEOMETRY") is not None
+
+
 def let_light_through(material: bpy.types.Material) -> None:
     """Make a lamp's material purely additive: it emits, reflects nothing and blocks no light."""
     tree, shader = material.node_tree, principled(material)

@@ -25,7 +25,7 @@ from ..data.arrays import make_mesh
 from ..data.cameras import best_view, lens_warning, make_cameras, make_track, make_view, size_warning, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import let_light_through, make_material
-from ..data.mesh_objects import by_object, each_object, is_open
+from ..data.mesh_objects import by_object, each_object, is_one_sided
 from ..data.nodes import make_world
 from ..refused import refused
 from .as_made import stamp, stamp_tree
@@ -70,7 +70,7 @@ def _build(
         obj = objects[object_id]
         for instance in of_object:
             description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
-            one_sided = description.model.gives_light and is_open(obj.data)
+            one_sided = description.model.gives_light and is_one_sided(obj.data, capture.mesh.whole)
             base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
             material = make_material(description, base_color, one_sided=one_sided)
             if instance.object_id != object_id:

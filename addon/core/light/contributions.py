@@ -34,6 +34,7 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
 
         for_blocks(aim, len(element), ELEMENTS_AT_ONCE, 0)
     group_of, patterns = _group_of(field, groups), cosine_patterns(rays, seed)
+    one_sided = field.with_light(field.radiance, lamps=[i for objects in groups for i in objects]).one_sided
 
     def gather(part: slice) -> None:
         p, n = position[part], normal[part]
@@ -44,8 +45,9 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
         triangle = hits.triangle[hit]
         facing = -np.einsum("ij,ij->i", directions[hit], field.normal[triangle])
         aimed = density[triangle] * hits.distance[hit] ** 2 / np.maximum(np.abs(facing), 1e-6)
-        # Lamps are dark from behind.
-        value = np.pi / rays * balance(rays * cosine.ravel()[hit], emitter_rays * aimed) * (facing > 0)
+        # Most lamps are dark from behind.
+        lit_side = (facing > 0) | ~one_sided[triangle]
+        value = np.pi / rays * balance(rays * cosine.ravel()[hit], emitter_rays * aimed) * lit_side
         cell = hit // rays * len(groups) + group_of[triangle]
         E[part] += np.bincount(cell, value, len(p) * len(groups)).reshape(len(p), len(groups))
 

@@ -13,6 +13,7 @@ from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup
 from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
+from ..scene.two_sides import bulges
 from .environment import Environment
 from .mirrors import Mirror
 from .openings import Openings
@@ -32,7 +33,8 @@ class LightField:
     lamps : iterable of int
         Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
         lamp that is a bare rectangle under a ceiling does not light the gap above it. So does each side of a sheet
-        that has two (`Mesh.backs`).
+        that has two (`Mesh.backs`). In a mesh without objects a lamp that `bulges` shines on both: what lacks of a
+        bulb, as no frame saw it, shines too, and its inside does in its stead.
     lookup : ElementLookup, optional
         Of this mesh and atlas, if there is one already.
     """
@@ -92,7 +94,12 @@ class LightField:
         return field
 
     def _set_lamps(self, lamps: Iterable[int]) -> None:
-        self.one_sided = np.isin(self.mesh.object_id, list(lamps))
+        one_sided = list(lamps)
+        if self.mesh.whole:
+            normal, area = self.mesh.geometry
+            triangles = {lamp: self.mesh.object_id == lamp for lamp in one_sided}
+            one_sided = [lamp for lamp, own in triangles.items() if not bulges(normal[own], area[own])]
+        self.one_sided = np.isin(self.mesh.object_id, one_sided)
         self._lamps = bool(self.one_sided.any())
         if self.mesh.backs is not None:  # rays meet no side from behind, but are aimed at points on either
             self.one_sided[self.mesh.backs] = True

@@ -132,6 +132,9 @@ class SidesParams:
         Every fourth pixel in x and y votes.
     max_rays : int
         Rays over all frames; of larger captures every second, third ... pixel votes.
+    flat : float
+        Length of a lamp's mean normal from which on it is no globe: 1 in a plane, .94 to 1 of nine fused panels, .5 of
+        half a globe, .4 of a fused bulb of which six tenths are there.
     """
 
     least_share: float = 0.05
@@ -142,6 +145,7 @@ class SidesParams:
     upright: float = 0.3
     pixel_step: int = 4
     max_rays: int = 20_000_000
+    flat: float = 0.7
 
 
 SIDES = SidesParams()

@@ -7,7 +7,7 @@ from addon.core.scene.model import Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, each_object  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, each_object, is_one_sided  # noqa: E402
 
 INSTANCES = (Instance(2, "Sofa"), Instance(5, "Sofa"), Instance(7, "Wall"), Instance(8, "Ghost"))
 
@@ -76,3 +76,20 @@ def test_a_part_of_what_has_no_triangles_is_an_object(scene, mesh):
     instances = (Instance(2, "Leg", part_of=8), *INSTANCES[1:])
     objects = dict(each_object(mesh, instances, mesh.uv, scene.collection))
     assert [o.name for o in objects.values()] == ["Leg 2", "Sofa 5", "Wall 7"]
+
+
+@pytest.mark.parametrize(
+    ("faces", "guessed", "one_sided"),
+    [
+        (range(6), True, False),  # closed
+        (range(1), True, True),  # a panel
+        (range(5), True, False),  # what was fused of a globe
+        (range(5), False, True),
+    ],
+)
+def test_a_lamp_shines_to_its_front_if_it_is_open_and_flat(faces, guessed, one_sided):
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    data = bpy.data.meshes.new("lamp")
+    data.from_pydata(corners, [], [quads[k] for k in faces])
+    assert is_one_sided(data, guessed) == one_sided

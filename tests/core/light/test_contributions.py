@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,35 @@ def test_a_lamp_throws_light_over_a_mirror_and_none_backwards():
     above = make_room([quad((-3, -2, 4), (0, 4, 0), (6, 0, 0), 0), SHADE[1]], 0.2)
     over = np.flatnonzero(above.atlas.object_id == 0)
     assert not contributions(above.field(above.by_object({})), over, [[2]], seed=0).any()
+
+
+SHELL = [
+    quad((-0.2, -0.2, 1.8), (0, 0.4, 0), (0.4, 0, 0), 1),
+    quad((0.2, -0.2, 1.8), (0, 0.4, 0), (0, 0, 0.4), 1),
+    quad((-0.2, -0.2, 1.8), (0, 0, 0.4), (0, 0.4, 0), 1),
+    quad((-0.2, 0.2, 1.8), (0, 0, 0.4), (0.4, 0, 0), 1),
+    quad((-0.2, -0.2, 1.8), (0.4, 0, 0), (0, 0, 0.4), 1),
+]
+"""A box that faces outwards, open at its top."""
+
+
+@pytest.mark.parametrize("guessed", [False, True])
+def test_what_was_fused_of_a_bulb_from_below_lights_the_ceiling(guessed):
+    """Of a mesh without objects as if it were whole; elsewhere a lamp is dark from behind."""
+    room = make_room([quad((-3, -2, 4), (0, 4, 0), (6, 0, 0), 0), *SHELL], 0.2)
+    room = replace(room, mesh=replace(room.mesh, whole=guessed))
+    own = np.flatnonzero(room.atlas.object_id == 0)
+    radiance = room.by_object({1: (1, 1, 1)})
+    field = room.field(radiance).with_light(radiance, lamps=[1])
+    thrown, received = contributions(field, own, [[1]], seed=0)[:, 0], irradiance_at(field, own, 0)[:, 0]
+    top = quad((-0.2, -0.2, 2.2), (0.4, 0, 0), (0, 0.4, 0), 1)
+    seen = [*SHELL[1:], *([top] if guessed else [])]
+    position = room.atlas.position[own].astype(float)
+    before = [(position - one.corner) @ np.cross(one.edge_u, one.edge_v) > 0 for one in seen]
+    true = (polygon_irradiance(position, room.atlas.normal[own], seen) * np.stack(before, 1)).sum(1)
+    for found in (thrown, received):
+        assert np.abs(found - true).max() < 0.2 * true.max()
+        assert found.mean() == pytest.approx(true.mean(), rel=0.03)
 
 
 def test_the_lamps_that_reach_most_are_those_that_would_throw_most():
