@@ -47,11 +47,7 @@ class Samples:
 
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
-    """Elements to keep observations of: up to `LEVELS.sample` for each object, at random, sorted.
-
-    Up to `SAMPLES.in_all` go to all elements alike: a wall that a scan holds whole has more to tell than one of its
-    knobs, such as a mirror of one piece with it.
-    """
+    """Elements to keep observations of: up to `LEVELS.sample` for each object, at random, sorted."""
     rng = np.random.default_rng(seed)
     key = rng.random(len(atlas))
     order = np.lexsort((key, atlas.object_id))
@@ -60,9 +56,7 @@ def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
     limit = LEVELS.sample
     while limit > 16 and np.minimum(count, limit).sum() > SAMPLES.in_all:
         limit //= 2
-    kept, others = order[rank < limit], order[rank >= limit]
-    more = min(max(SAMPLES.in_all - len(kept), 0), len(others))
-    return np.sort(np.concatenate([kept, others[np.argsort(key[others])[:more]]]))
+    return np.sort(order[rank < limit])
 
 
 class SampleCollector:

@@ -33,16 +33,6 @@ def test_chosen_elements_are_few_sorted_and_the_same_again(atlas, monkeypatch):
     assert len(choose_elements(atlas, 0)) <= 500
 
 
-def test_what_objects_leave_over_goes_to_all_elements_alike(monkeypatch):
-    room = make_room([*box_sides(), quad((1, 1, 0.5), (0.4, 0, 0), (0, 0.4, 0), 6)], 0.05)
-    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, in_all=1500))  # up to 128 of each, and 668 more
-    count = np.bincount(room.atlas.object_id[choose_elements(room.atlas, 0)])
-    of_object = np.bincount(room.atlas.object_id)
-    assert count.sum() == 1500 and (count >= np.minimum(of_object, 128)).all()
-    more = (count - np.minimum(of_object, 128)) / np.maximum(of_object - 128, 1)
-    assert np.ptp(more[of_object > 128]) < 0.05
-
-
 def test_small_objects_are_kept_whole(atlas):
     assert np.array_equal(choose_elements(atlas, 0), np.arange(len(atlas)))
 

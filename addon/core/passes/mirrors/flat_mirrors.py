@@ -21,6 +21,7 @@ from ...light.lamps import Lamp
 from ...light.mirrors import Mirror
 from ...parallel import ordered_map
 from ...scene.model import Instance
+from ...scene.patches import MIRROR
 from ...scene.samples import Samples
 from ...significance import LEVELS
 from .mirrored import Views, tangents_of, turned
@@ -55,7 +56,7 @@ def find_mirrors(
     observations_of = by_number(field.atlas.object_id[samples.element[clear]])
     glowing = {lamp.object_id for lamp in lamps}
 
-    def flat_objects() -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    def flat_objects() -> Iterator[tuple[Instance, np.ndarray, np.ndarray, np.ndarray]]:
         for instance in instances:
             plane = None if instance.object_id in glowing else plane_of(field, instance.object_id)
             if plane is None:
@@ -68,14 +69,15 @@ def find_mirrors(
                 observations = observations[
                     np.isin(samples.element[observations], rng.choice(elements, LEVELS.of_object, replace=False))
                 ]
-            yield instance.object_id, point, normal, observations
+            yield instance, point, normal, observations
 
-    def fitted(candidate: tuple[int, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
-        object_id, point, normal, observations = candidate
-        fit = _fit_mirror(
-            Views.of(field, samples, observations), field.atlas.normal[samples.element[observations]], normal
-        )
-        return None if fit is None else Mirror(object_id, point, *fit)
+    def fitted(candidate: tuple[Instance, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
+        instance, point, normal, observations = candidate
+        # `mirror_patches` had tested what it sets apart.
+        least = LEVELS.enough if instance.guess and instance.class_name == MIRROR else LEVELS.many
+        views = Views.of(field, samples, observations, least)
+        fit = _fit_mirror(views, field.atlas.normal[views.element], normal)
+        return None if fit is None else Mirror(instance.object_id, point, *fit)
 
     return tuple(mirror for mirror in ordered_map(fitted, flat_objects(), 0) if mirror is not None)
 

@@ -10,6 +10,7 @@ of worktops, fronts, screens and walls in four rooms.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
@@ -102,7 +103,7 @@ def _regions_in(
         if inside.sum() < LEVELS.enough:
             continue
         of_region = views.part(np.flatnonzero(np.isin(views.element, element[inside])))
-        deviation, own_deviation, _, f0 = of_region.compare(normal, LEVELS.enough)
+        deviation, own_deviation, _, f0 = replace(of_region, least=LEVELS.enough).compare(normal)
         if deviation > MIRRORS.unexplained * own_deviation or not MIRRORS.least_f0 < f0.mean() < MIRRORS.most_f0:
             continue
         # Where it mirrors an even wall nothing varies that would tell; its F0 does.

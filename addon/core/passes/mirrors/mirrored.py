@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class Views:
     origin, direction : (m, 3) float32
         Just off the surface, and towards the camera.
     radiance : (m, 3) float32
+    least : int
+        So few say nothing. Where those around them told of a mirror, fewer do.
     """
 
     field: LightField
@@ -35,24 +37,24 @@ class Views:
     origin: np.ndarray
     direction: np.ndarray
     radiance: np.ndarray
+    least: int = LEVELS.many
 
     @staticmethod
-    def of(field: LightField, samples: Samples, index: np.ndarray) -> Views:
+    def of(field: LightField, samples: Samples, index: np.ndarray, least: int = LEVELS.many) -> Views:
         """Those of `samples` ((m,) int indices)."""
         element = samples.element[index]
         origin = field.scene.off_surface(field.atlas.position[element], field.atlas.normal[element])
-        return Views(field, element, origin, samples.direction[index], samples.radiance[index])
+        return Views(field, element, origin, samples.direction[index], samples.radiance[index], least)
 
     def __len__(self) -> int:
         return len(self.element)
 
     def part(self, index: np.ndarray) -> Views:
         """The observations at `index`."""
-        return Views(self.field, *(getattr(self, k)[index] for k in ("element", "origin", "direction", "radiance")))
+        names = "element", "origin", "direction", "radiance"
+        return replace(self, **{name: getattr(self, name)[index] for name in names})
 
-    def known(
-        self, normals: np.ndarray, least: int = LEVELS.many
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """Observations ((k,) int) whose mirrored direction is known under `normals`, the radiance from there ((k, 3)),
         and the logarithms of the observed and of the predicted radiance, (k,) each; None if there are fewer."""
         twice_cosine = (
@@ -60,7 +62,7 @@ class Views:
         )
         predicted = self.field.along(self.origin, (twice_cosine * normals - self.direction).astype(np.float32))[0]
         known = np.flatnonzero(predicted.mean(1) > DARK)
-        if len(known) < least:
+        if len(known) < self.least:
             return None
         observed, predicted = self.radiance[known], predicted[known]
         return known, predicted, *(np.log(np.maximum(x.mean(1), DARK)) for x in (observed, predicted))
@@ -74,8 +76,8 @@ class Views:
         # Beside an edge a ray of a slightly different direction meets another surface altogether.
         return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.stray).mean())
 
-    def compare(self, normals: np.ndarray, least: int = LEVELS.many) -> tuple[float, float, float, np.ndarray]:
-        """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen; `least` as in `known`.
+    def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
+        """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen.
 
         Returns
         -------
@@ -86,7 +88,7 @@ class Views:
             Of what was seen with the mirrored room, within the elements.
         f0 : (3,) float
         """
-        result = self.known(normals, least)
+        result = self.known(normals)
         if result is None:
             return np.inf, 0.0, 0.0, np.zeros(3)
         known, predicted, a, b = result
