@@ -73,7 +73,7 @@ def find_mirrors(
 
     def fitted(candidate: tuple[Instance, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
         instance, point, normal, observations = candidate
-        # `mirror_patches` had tested what it sets apart.
+        # `mirror_patches` has found that what it sets apart mirrors.
         least = LEVELS.enough if instance.guess and instance.class_name == MIRROR else LEVELS.many
         views = Views.of(field, samples, observations, least)
         fit = _fit_mirror(views, field.atlas.normal[views.element], normal)

@@ -113,12 +113,12 @@ def _regions_in(
         # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
         hull, depth = Delaunay(position[inside] @ axes.T, qhull_options="QJ"), position[inside] @ normal
         chosen = (middle @ normal > depth.min() - margin) & (middle @ normal < depth.max() + margin) & ~taken
-        # Most are rectangles: of one, no view of its corners tells that they are something else.
+        # Most are rectangles, unless views of the corners tell that these are something else.
         low, high = (limit(position[inside] @ axes.T, 0) for limit in (np.min, np.max))
         in_box, of_box = (((x @ axes.T > low) & (x @ axes.T < high)).all(1) for x in (position, middle))
         corners = in_box & (hull.find_simplex(position @ axes.T) < 0)
-        whole = corners.sum() < LEVELS.few or np.median(stray[corners]) < LEVELS.likely * np.median(stray[inside])
-        chosen &= of_box if whole else hull.find_simplex(middle @ axes.T) >= 0
+        alike = corners.sum() < LEVELS.few or np.median(stray[corners]) < LEVELS.likely * np.median(stray[inside])
+        chosen &= of_box if alike else hull.find_simplex(middle @ axes.T) >= 0
         taken |= chosen
         if chosen.any():
             parts.append(chosen)
@@ -159,9 +159,8 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     f0 = np.median(log_f0[neighbours], 1)
     variance = around(a * a)
     correlation = around(a * b) / np.sqrt(np.maximum(variance * around(b * b), 1e-12))
-    residual = np.where(
-        (count > 1)[group], observed - predicted - f0[group], 0
-    )  # one view of an element has no variance
+    several = (count > 1)[group]  # one view of an element has no variance
+    residual = np.where(several, observed - predicted - f0[group], 0)
     unexplained = around(residual**2) / np.maximum(variance, 1e-12)
     possible = (f0 > np.log(MIRRORS.least_f0)) & (f0 < np.log(MIRRORS.most_f0))
     mirrored = (unexplained < 1) & (correlation > MIRRORS.together) & possible

@@ -29,7 +29,7 @@ class Views:
         Just off the surface, and towards the camera.
     radiance : (m, 3) float32
     least : int
-        So few say nothing. Where those around them told of a mirror, fewer do.
+        Fewer say nothing. It is lower for what was found to mirror before.
     """
 
     field: LightField
@@ -56,7 +56,7 @@ class Views:
 
     def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """Observations ((k,) int) whose mirrored direction is known under `normals`, the radiance from there ((k, 3)),
-        and the logarithms of the observed and of the predicted radiance, (k,) each; None if there are fewer."""
+        and the logarithms of the observed and of the predicted radiance, (k,) each; None for fewer than `least`."""
         twice_cosine = (
             2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         )
