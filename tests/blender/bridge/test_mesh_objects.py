@@ -6,6 +6,7 @@ import pytest
 from addon.core.scene.model import Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
+import bmesh  # noqa: E402
 
 from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, each_object, is_one_sided  # noqa: E402
 
@@ -79,17 +80,19 @@ def test_a_part_of_what_has_no_triangles_is_an_object(scene, mesh):
 
 
 @pytest.mark.parametrize(
-    ("faces", "guessed", "one_sided"),
+    ("below", "guessed", "one_sided"),
     [
-        (range(6), True, False),  # closed
-        (range(1), True, True),  # a panel
-        (range(5), True, False),  # what was fused of a globe
-        (range(5), False, True),
+        (2.0, True, False),  # closed
+        (0.3, True, False),  # what was fused of a globe from below
+        (0.3, False, True),
+        (-0.85, True, True),  # of its bottom alone
     ],
 )
-def test_a_lamp_shines_to_its_front_if_it_is_open_and_flat(faces, guessed, one_sided):
-    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    data = bpy.data.meshes.new("lamp")
-    data.from_pydata(corners, [], [quads[k] for k in faces])
+def test_a_lamp_shines_to_its_front_if_it_is_open_and_no_globe(below, guessed, one_sided):
+    data, globe = bpy.data.meshes.new("lamp"), bmesh.new()
+    bmesh.ops.create_icosphere(globe, subdivisions=3, radius=1)
+    others = [face for face in globe.faces if face.calc_center_median().z > below]
+    bmesh.ops.delete(globe, geom=others, context="FACES")
+    globe.to_mesh(data)
+    globe.free()
     assert is_one_sided(data, guessed) == one_sided

@@ -11,7 +11,7 @@ from addon.core.light.contributions import contributions, reaching_most
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
 from addon.core.light.mirrors import Mirror
-from tests.core.rooms import box_sides, make_room, polygon_irradiance, quad
+from tests.core.rooms import box_sides, cut, make_room, polygon_irradiance, quad
 
 SHADE = [quad((x, -0.2, 2), (0, 0.4, 0), (0.4, 0, 0), 1 + k) for k, x in enumerate((-2.0, 1.0))]
 
@@ -67,7 +67,8 @@ SHELL = [
 @pytest.mark.parametrize("guessed", [False, True])
 def test_what_was_fused_of_a_bulb_from_below_lights_the_ceiling(guessed):
     """Of a mesh without objects as if it were whole; elsewhere a lamp is dark from behind."""
-    room = make_room([quad((-3, -2, 4), (0, 4, 0), (6, 0, 0), 0), *SHELL], 0.2)
+    halves = [cut(side, (0, 1), half) for side in SHELL for half in ((0, 0.5), (0.5, 1))]
+    room = make_room([quad((-3, -2, 4), (0, 4, 0), (6, 0, 0), 0), *halves], 0.2)
     room = replace(room, mesh=replace(room.mesh, whole=guessed))
     own = np.flatnonzero(room.atlas.object_id == 0)
     radiance = room.by_object({1: (1, 1, 1)})
