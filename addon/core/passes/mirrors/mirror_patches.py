@@ -5,8 +5,8 @@ chimney and its sides, every direction that much of it faces is tried. Each obse
 those around it for showing the mirrored room, as `flat_mirrors` tests an object. A piece is a mirror if most of its
 elements do: two mirrors of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at
 most .11. A region of a larger piece is one if the mirrored room explains what it shows, by the same measure as a
-flat object: .11 of the deviation from its own means is left in a mirror of a study, .33 to 2.3 in some twenty regions
-of worktops, fronts, screens and walls in four rooms.
+flat object: .06 and .08 of the deviation from its own means are left in the mirrors of two studies, .33 to 2.3 in some
+twenty regions of worktops, fronts, screens and walls in five rooms.
 """
 
 from collections.abc import Iterator

@@ -97,7 +97,7 @@ class Views:
         correlation = float(np.mean(centred_a * centred_b) / max(centred_a.std() * centred_b.std(), 1e-12))
         f0 = np.median(self.radiance[known] / np.maximum(predicted, DARK), 0)
         several = (count > 1)[group]
-        if several.sum() < LEVELS.enough:
+        if several.sum() < LEVELS.few:
             return np.inf, 0.0, correlation, f0
         deviation = float(np.median(np.abs(a - b - np.median(a - b))[several]))
         return deviation, float(np.median(np.abs(centred_a)[several])), correlation, f0
