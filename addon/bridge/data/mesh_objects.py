@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.groups import by_number
 from ...core.scene.model import Instance, Mesh
-from ...core.scene.two_sides import bulges
+from ...core.scene.shells import bulges
 from ..custom_properties import OBJECT_ID
 from .arrays import make_mesh, read, set_layer
 
@@ -93,7 +93,7 @@ def is_one_sided(data: bpy.types.Mesh, parts_guessed: bool) -> bool:
     """Whether a lamp of this mesh shines on the side alone that its normals show.
 
     It does if it is open (has edges with one face only), unless it is of a mesh without objects, whose parts were
-    guessed, and bulges (`two_sides.bulges`).
+    guessed, and bulges (`shells.bulges`).
     """
     edges = read(data.loops, "edge_index", kind=np.int32)
     if not (np.bincount(edges, minlength=len(data.edges)) == 1).any():

@@ -13,7 +13,7 @@ from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup
 from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
-from ..scene.two_sides import bulges
+from ..scene.shells import bulges
 from .environment import Environment
 from .mirrors import Mirror
 from .openings import Openings

@@ -112,7 +112,7 @@ SAMPLES = SampleParams()
 
 @dataclass(frozen=True)
 class SidesParams:
-    """What is given a second side, and which side faces the room (`two_sides`, `orientation`, `vote`).
+    """What is given a second side, and which side faces the room (`two_sides`, `shells`, `orientation`, `vote`).
 
     Attributes
     ----------

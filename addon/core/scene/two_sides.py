@@ -160,12 +160,3 @@ def laid_apart(mesh: Mesh, vertices: np.ndarray) -> Mesh:
         vertices=np.concatenate([vertices, flipped(corners - gap * direction).reshape(-1, 3)]),
         triangles=np.concatenate([mesh.triangles[:count], backs]).astype(mesh.triangles.dtype),
     )
-
-
-def bulges(normal: np.ndarray, area: np.ndarray) -> bool:
-    """Whether triangles of these normals ((t, 3), unit) and areas ((t,)) are what was fused of a globe, by its front.
-
-    Of a lamp it shines on both sides: what lacks, as no frame saw it, shines too, and the inside does in its stead.
-    The normals of a few triangles are noise.
-    """
-    return len(area) >= LEVELS.few and bool(np.linalg.norm(area @ normal) < SIDES.flat * area.sum())
