@@ -35,7 +35,9 @@ def through(value):
 )  # fmt: skip
 def test_as_it_was(value):
     found = through(value)
-    assert found == value and type(found) is type(value) and repr(found) == repr(value)
+    assert found == value and type(found) is type(value)
+    # A set's own order goes by the seed of Python's hashes and by how it was filled.
+    assert isinstance(value, frozenset) or repr(found) == repr(value)
 
 
 def test_arrays_keep_type_shape_and_order():
