@@ -18,6 +18,7 @@ from mathutils import Vector
 from ...core.brdf.lambertian import TYPICAL_ALBEDO
 from ...core.scene.sphere import fibonacci
 from ..data.arrays import read, triangles_of, vertices_of
+from ..data.materials import shines_to_the_front
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
@@ -211,7 +212,7 @@ def _lamp_source(scene, name: str) -> Source:
         max=len(areas) - 1
     )
     samples = [(Vector(corners[k].mean(0)), Vector(area_vectors[k] / areas[k])) for k in chosen]
-    two_sided = not any(node.type == "NEW_GEOMETRY" for node in lamp.node_tree.nodes)
+    two_sided = not shines_to_the_front(lamp)
     sample_area = total_area / _LAMP_SAMPLES
 
     def irradiance(point: Vector) -> Iterator[tuple[Vector, float, float]]:

@@ -21,9 +21,11 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
     position, normal = field.atlas.position[element], field.atlas.normal[element]
     rays, emitter_rays = LIGHT_FIT.rays, LIGHT_FIT.emitter_rays
     E, density = np.zeros((len(element), len(groups))), np.zeros(len(field.mesh.triangles), np.float32)
+    one_sided = np.zeros(len(density), bool)
     for k, objects in enumerate(groups):
         alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1)
         lit_alone = field.with_light(alone, Environment.dark(), objects)
+        one_sided |= lit_alone.one_sided
         aimed = shining(lit_alone)
         density[aimed.triangle] = aimed.density[aimed.triangle]
 
@@ -34,7 +36,6 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
 
         for_blocks(aim, len(element), ELEMENTS_AT_ONCE, 0)
     group_of, patterns = _group_of(field, groups), cosine_patterns(rays, seed)
-    one_sided = field.with_light(field.radiance, lamps=[i for objects in groups for i in objects]).one_sided
 
     def gather(part: slice) -> None:
         p, n = position[part], normal[part]

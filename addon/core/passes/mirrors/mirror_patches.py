@@ -98,6 +98,7 @@ def _regions_in(
     neighbours = cKDTree(position).query(position, k=min(LEVELS.neighbours, count))[1].reshape(count, -1)
     region = _connected(mirrored[neighbours].mean(1) > 0.5, neighbours)
     axes, taken, parts = np.stack(plane_axes(normal, [])), np.zeros(len(middle), bool), []
+    in_plane, middle_in_plane = position @ axes.T, middle @ axes.T
     for label in range(region.max() + 1):
         inside = region == label
         if inside.sum() < LEVELS.enough:
@@ -111,14 +112,15 @@ def _regions_in(
         grown = _connected(inside | (stray < np.median(stray[inside])), neighbours)
         inside = grown == grown[inside][0]
         # Mirrors are convex, and beside what hangs over one it is not sure that they are some.
-        hull, depth = Delaunay(position[inside] @ axes.T, qhull_options="QJ"), position[inside] @ normal
+        hull, depth = Delaunay(in_plane[inside], qhull_options="QJ"), position[inside] @ normal
         chosen = (middle @ normal > depth.min() - margin) & (middle @ normal < depth.max() + margin) & ~taken
         # Most are rectangles, unless views of the corners tell that these are something else.
-        low, high = (limit(position[inside] @ axes.T, 0) for limit in (np.min, np.max))
-        in_box, of_box = (((x @ axes.T > low) & (x @ axes.T < high)).all(1) for x in (position, middle))
-        corners = in_box & (hull.find_simplex(position @ axes.T) < 0)
-        alike = corners.sum() < LEVELS.few or np.median(stray[corners]) < LEVELS.likely * np.median(stray[inside])
-        chosen &= of_box if alike else hull.find_simplex(middle @ axes.T) >= 0
+        low, high = in_plane[inside].min(0), in_plane[inside].max(0)
+        corners = ((in_plane > low) & (in_plane < high)).all(1) & (hull.find_simplex(in_plane) < 0)
+        if corners.sum() < LEVELS.few or np.median(stray[corners]) < LEVELS.likely * np.median(stray[inside]):
+            chosen &= ((middle_in_plane > low) & (middle_in_plane < high)).all(1)
+        else:
+            chosen &= hull.find_simplex(middle_in_plane) >= 0
         taken |= chosen
         if chosen.any():
             parts.append(chosen)
