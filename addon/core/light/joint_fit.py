@@ -47,7 +47,7 @@ class Unknown:
     lower : (k + s, 3) float64
         Lower bounds of radiances and factor.
     expected : (k + s, 3) float64
-        Radiances that the prior expects, and 1. As the sun was measured, its level has a prior of the full weight.
+        Radiances that the prior expects, and 1. As the sun was measured, its prior has the full weight.
     """
 
     contribution: np.ndarray
@@ -107,11 +107,10 @@ class _NegativeLogPosterior:
         level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
         tint = (deviation - deviation.mean(1, keepdims=True)) / JOINT_FIT.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
-        weight = JOINT_FIT.sources * channels / k
-        of_level = np.full((k, 1), weight)
-        of_level[self._unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
-        value += float((of_level * np.log1p(level**2)).sum() + weight * np.log(coloured).sum())
-        gradient += 2 * of_level * level / (channels * JOINT_FIT.unlike * (1 + level**2))
+        weight = np.full((k, 1), JOINT_FIT.sources * channels / k)
+        weight[self._unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
+        value += float((weight * (np.log1p(level**2) + np.log(coloured))).sum())
+        gradient += 2 * weight * level / (channels * JOINT_FIT.unlike * (1 + level**2))
         gradient += 2 * weight * tint / (JOINT_FIT.tint * coloured)
         return value, gradient.ravel()
 

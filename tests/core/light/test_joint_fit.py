@@ -35,3 +35,17 @@ def test_any_unit_of_radiance_does():
         unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), float(unit)))
         (found,), _ = solve(unit * sent, np.full((m, 3), float(unit)), unknown, pairs)
         assert found == pytest.approx(20 * unit, rel=0.1)
+
+
+def test_green_where_the_sun_throws_most_light_is_paint():
+    """Many openings beside it are unknown, too: none of them has much of the prior's weight, but the sun has."""
+    rng, m, cells = np.random.default_rng(2), 1000, 60
+    by_sun = np.repeat(rng.uniform(0, 1, (m, 1, 1)), 3, 2)
+    through = 0.02 * rng.uniform(0, 1, (m, cells))
+    green = np.where(by_sun[:, 0] > 0.6, [1.0, 1.6, 1.0], 1.0)
+    sent = 0.4 / np.pi * green * (1 + 2 * by_sun[:, 0] + through.sum(1, keepdims=True))
+    expected = np.ones((cells + 1, 3))
+    unknown = Unknown(through, by_sun, 1e-6 * expected, expected)
+    pairs = rng.integers(0, m, (8 * m, 2))
+    found, _ = solve(sent, np.ones((m, 3)), unknown, pairs)
+    assert found[-1] == pytest.approx(found[-1].mean() * np.ones(3), rel=0.15) and 1.3 < found[-1].mean() < 3
