@@ -192,7 +192,11 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
 
 
 def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
-    """Choose a model by some of the object's samples, which come last; a `guess` is never called metal."""
+    """Choose a model by some of the object's samples, which come last; a `guess` is never called metal.
+
+    Whether a guess has a lobe is told where highlights are expected: a lamp's lies on one in a hundred of the elements
+    of a wall of tiles. Its lobe, where all of it tells one, is what all of it tells.
+    """
     elements = FIT.part_elements if guess else LEVELS.of_object
     index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
     if not len(index):
@@ -201,13 +205,12 @@ def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tupl
     rays = room.settings.specular_rays * LEVELS.of_object // elements
     problem = maker.problem(index, rays)
     choice = choose_model(problem, guess)
-    if not choice.model.has_lobe and not guess and "highlight-sampling" not in room.settings.without:
-        # A lamp's highlight lies on one in a hundred of the elements of a wall of tiles.
+    if (guess or not choice.model.has_lobe) and "highlight-sampling" not in room.settings.without:
         where_expected = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True, highlights=True)
         if not np.array_equal(where_expected, index):
             second_problem = maker.problem(where_expected, rays)
-            second_choice = choose_model(second_problem)
-            if second_choice.model.layered:
+            second_choice = choose_model(second_problem, guess)
+            if second_choice.model.layered != choice.model.has_lobe:
                 return second_choice, second_problem, where_expected
     return choice, problem, index
 

@@ -59,15 +59,17 @@ class Choice:
         return self.fit
 
 
-def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
+def _gain(with_lobe: np.ndarray, without: np.ndarray, most: float = np.inf) -> tuple[float, float]:
     """Share of the elements' costs that the lobe saves, and the same in standard errors.
 
-    Nothing where it seems to save more than all: the rays' noise that is taken out of a cost is itself told by few of
-    them, and for broad lobes it may come out at many times the cost.
+    No element counts for saving or costing more than `most`. Nothing where it seems to save more than all: the rays'
+    noise that is taken out of a cost is itself told by few of them, and for broad lobes it may come out at many times
+    the cost.
     """
     saved = without - with_lobe
     if saved.sum() > max(without.sum(), 0):
         return 0.0, 0.0
+    saved = np.clip(saved, -most, most)
     error = saved.std() / np.sqrt(len(saved))
     # Elements seen once cost nothing either way, but for rounding.
     return float(saved.sum() / max(without.sum(), 1e-6 * len(saved))), float(saved.mean() / max(error, 1e-30))
@@ -151,8 +153,9 @@ def _own_or_class_lobe(own_lobe: LobeFit, class_lobe: LobeFit, model: Brdf, prob
 def choose_model(problem: Problem, part: bool = False) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements.
 
-    A `part` that is found by shape alone may hold other objects without a highlight: its lobe need only be likely,
-    however little it gains. It is never called metal, which would take the texture of all of them.
+    A `part` that is found by shape alone may hold other objects: a rug on the floor, which speaks against its varnish.
+    So its lobe need only be likely, however little it gains, and each element's say is limited, whichever way it tells.
+    It is never called metal, which would take the texture of all of them.
     """
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
@@ -169,7 +172,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     dense, scale = _weighted(dense, fit)
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
-    gain, sigmas = _gain(with_lobe, without)
+    gain, sigmas = _gain(with_lobe, without, LEVELS.outlier if part else np.inf)
     large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
     enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
     # At the grid's end a still broader one might do as well.

@@ -53,11 +53,31 @@ def test_a_part_needs_less_evidence_and_is_never_metal(seen):
     box = Box()
     element, direction, _ = box.views(60, 8)
     faint = box.problem(element, direction, 0.11, 0.02, paint(element))
-    noise = np.exp(0.14 * np.random.default_rng(3).normal(size=(len(element), 1)))
+    noise = np.exp(0.12 * np.random.default_rng(3).normal(size=(len(element), 1)))
     faint = replace(faint, radiance=(faint.radiance * noise).astype(np.float32))
     assert (choose_model(faint).model, choose_model(faint, part=True).model) == (LAMBERTIAN, DIELECTRIC)
     assert choose_model(seen["diffuse"], part=True).model == LAMBERTIAN
     assert choose_model(seen["metal"], part=True).model != METAL
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rug_on_a_varnished_floor_says_less_than_all_the_floor(seed):
+    """It lies on the tenth of the elements where highlights would be strongest."""
+    box, rng = Box(), np.random.default_rng(seed)
+    element, direction, _ = box.views(200, 8)
+    varnish = box.problem(element, direction, 0.11, 0.04, paint(element))
+    bare = box.problem(element, direction, None, 0, paint(element))
+    number = np.unique(element, return_inverse=True)[1]
+    highlight = np.zeros(200)
+    np.maximum.at(highlight, number, (varnish.radiance / bare.radiance).mean(1))
+    rug = (highlight > np.quantile(highlight, 0.9))[number]
+    noise = np.exp(0.1 * rng.normal(size=(len(element), 1)))
+    radiance = np.where(rug[:, None], bare.radiance, varnish.radiance) * noise
+    mixed = replace(varnish, radiance=radiance.astype(np.float32))
+    found = choose_model(mixed, part=True)
+    assert found.model == DIELECTRIC and found.sigmas > 1.1 * choose_model(mixed).sigmas
+    all_bare = replace(bare, radiance=(bare.radiance * noise).astype(np.float32))
+    assert choose_model(all_bare, part=True).model == LAMBERTIAN
 
 
 def test_a_broad_lobe_has_to_gain_much():
