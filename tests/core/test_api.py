@@ -118,6 +118,7 @@ print(hasattr(package, "nonsense"))
     assert done.stdout.split() == ["True", "True", "False"], done.stderr
 
 
+@pytest.mark.slow
 def test_a_mesh_that_can_not_be_laid_out_is_told(root, disk, tmp_path):
     code = """
 import scan_relight

@@ -21,6 +21,7 @@ def plan(capsys, *argv) -> list[dict]:
     return json.loads(capsys.readouterr().out)["rooms"]
 
 
+@pytest.mark.slow
 def test_the_graph_says_the_same_as_the_command(capture, whole, tmp_path, capsys, monkeypatch):
     """The commands of a plan, done in its order, with none before those that it waits for."""
     [room] = plan(capsys, capture, "--out", tmp_path, "--blocks", "2", *OPTIONS)

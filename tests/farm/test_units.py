@@ -107,6 +107,7 @@ def test_blocks_side_by_side_one_killed_one_twice_one_never(capture, whole, tmp_
     assert_same(result, whole)
 
 
+@pytest.mark.slow
 def test_what_blocks_found_is_what_is_taken(capture, whole, tmp_path, monkeypatch):
     """With all blocks there, what joins them looks at no object again."""
     from addon.core.pipeline import choose_models

@@ -180,6 +180,7 @@ def test_between_grid_points():
     assert between(x, np.array([1.0, 1.0, 1.0]), psi, 1)[0] == 0.5
 
 
+@pytest.mark.slow
 def test_a_surface_that_turns_within_each_pixel_is_no_rougher(box):
     """Each pixel shows normals that differ by .05 radians either way: directions of the lobe differ by twice that."""
     element, direction, _ = box.views(60, 8)

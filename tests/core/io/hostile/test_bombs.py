@@ -122,6 +122,7 @@ def test_a_jpeg_of_many_scans(tmp_path):
         read_coded(path)
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_frames_that_are_missing(tmp_path):
     capture = CaptureOnDisk(tmp_path, 1)
     pose = capture.transforms["frames"][0]["transform_matrix"]

@@ -9,6 +9,7 @@ from addon.core.passes.specular.intervals import jackknife
 from tests.core.glossy_box import Box
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, 0.08])
 def test_the_jackknife_tells_how_far_fits_to_other_elements_lie(noise):
     box = Box()

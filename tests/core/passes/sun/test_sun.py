@@ -117,6 +117,7 @@ def test_gloss_in_shade_no_longer_makes_the_sun_weak(room):
     assert strength_without_gloss(field, lit.radiance, found.irradiance - sunlight, lit.seen, clipped) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sun", [sunny.SUN, np.zeros(3)])
 def test_a_chequered_floor_neither_hides_a_sun_nor_makes_one(room, sun):
     """Dark tiles in the sun are as bright as white ones in shade, so an object's spread of albedo tells nothing."""
