@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -194,25 +194,30 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
 def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last; a `guess` is never called metal.
 
-    Whether a guess has a lobe is told where highlights are expected: a lamp's lies on one in a hundred of the elements
-    of a wall of tiles. Its lobe, where all of it tells one, is what all of it tells.
+    A lamp's highlight lies on one in a hundred of the elements of a wall of tiles, so what shows none is looked at once
+    more where highlights are expected. Of a guess that decides; its lobe is what all of it tells, if that tells one.
     """
     elements = FIT.part_elements if guess else LEVELS.of_object
-    index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
-    if not len(index):
-        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
     rays = room.settings.specular_rays * LEVELS.of_object // elements
-    problem = maker.problem(index, rays)
-    choice = choose_model(problem, guess)
-    if (guess or not choice.model.has_lobe) and "highlight-sampling" not in room.settings.without:
-        where_expected = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True, highlights=True)
-        if not np.array_equal(where_expected, index):
-            second_problem = maker.problem(where_expected, rays)
-            second_choice = choose_model(second_problem, guess)
-            if second_choice.model.layered != choice.model.has_lobe:
-                return second_choice, second_problem, where_expected
-    return choice, problem, index
+    pick = partial(maker.pick, object_id, elements, FIT.views, seed=1, smooth=True)
+
+    def look(index: np.ndarray) -> tuple[Choice, Problem, np.ndarray]:
+        problem = maker.problem(index, rays)
+        return choose_model(problem, guess), problem, index
+
+    expecting = "highlight-sampling" not in room.settings.without
+    index = pick(highlights=guess and expecting)
+    if not len(index):
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
+    found = look(index)
+    if not expecting or found[0].model.has_lobe != guess:
+        return found
+    others = pick(highlights=not guess)
+    if np.array_equal(others, index):
+        return found
+    second = look(others)
+    return second if second[0].model.layered else found
 
 
 def _by_looks(
