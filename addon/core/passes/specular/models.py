@@ -154,8 +154,8 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements.
 
     A `part` that is found by shape alone may hold other objects: a rug on the floor, which speaks against its varnish.
-    So its lobe need only be likely, however little it gains, and each element's say is limited, whichever way it tells.
-    It is never called metal, which would take the texture of all of them.
+    So its lobe need only be likely, however little it gains, and no element says more, either way, than an observation
+    that lies `LEVELS.outlier` standard deviations off. It is never called metal, which would take the texture of all.
     """
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
@@ -172,7 +172,7 @@ def choose_model(problem: Problem, part: bool = False) -> Choice:
     dense, scale = _weighted(dense, fit)
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
-    gain, sigmas = _gain(with_lobe, without, LEVELS.outlier if part else np.inf)
+    gain, sigmas = _gain(with_lobe, without, LEVELS.outlier**2 / 2 if part else np.inf)
     large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
     enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
     # At the grid's end a still broader one might do as well.
