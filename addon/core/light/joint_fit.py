@@ -76,6 +76,9 @@ class _NegativeLogPosterior:
         self._difference = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
         self._difference_transposed = self._difference.T.tocsr()
         self.expected = np.log(np.maximum(unknown.expected, 1e-6))
+        k, channels = self.expected.shape
+        self._weight = np.full((k, 1), JOINT_FIT.sources * channels / max(k, 1))
+        self._weight[unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
 
     def log_albedo(self, x: np.ndarray) -> np.ndarray:
         """(m, 3) at log radiances `x` ((k, 3))."""
@@ -107,11 +110,9 @@ class _NegativeLogPosterior:
         level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
         tint = (deviation - deviation.mean(1, keepdims=True)) / JOINT_FIT.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
-        weight = np.full((k, 1), JOINT_FIT.sources * channels / k)
-        weight[self._unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
-        value += float((weight * (np.log1p(level**2) + np.log(coloured))).sum())
-        gradient += 2 * weight * level / (channels * JOINT_FIT.unlike * (1 + level**2))
-        gradient += 2 * weight * tint / (JOINT_FIT.tint * coloured)
+        value += float((self._weight * (np.log1p(level**2) + np.log(coloured))).sum())
+        gradient += 2 * self._weight * level / (channels * JOINT_FIT.unlike * (1 + level**2))
+        gradient += 2 * self._weight * tint / (JOINT_FIT.tint * coloured)
         return value, gradient.ravel()
 
 

@@ -211,7 +211,9 @@ def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tupl
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     found = look(index)
-    if not expecting or found[0].model.has_lobe != guess:
+    # The first look settles that an object has a lobe, and that a guess has none.
+    settled = found[0].model.has_lobe != guess
+    if settled or not expecting:
         return found
     others = pick(highlights=not guess)
     if np.array_equal(others, index):

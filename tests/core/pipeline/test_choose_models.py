@@ -1,6 +1,8 @@
-"""What others of its class say of an object's model."""
+"""What an object's own frames say of its model, and what others of its class do."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,8 +10,9 @@ import pytest
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.passes.specular.models import choose_model
-from addon.core.pipeline.choose_models import Looked, Room, choose_models
+from addon.core.pipeline.choose_models import Looked, Room, _by_frames, choose_models
 from addon.core.scene.model import Instance
+from addon.core.settings import Settings
 from tests.core.fit.test_fit import paint
 from tests.core.glossy_box import Box
 
@@ -26,3 +29,33 @@ def test_a_class_that_shape_alone_tells_shares_no_lobe(guess):
     room = Room(instances, None, None, None, None, [])
     models = [choice.model for choice in choose_models(room, looked).choices.values()]
     assert models == [DIELECTRIC, LAMBERTIAN if guess else DIELECTRIC]
+
+
+@pytest.mark.parametrize(
+    ("guess", "anywhere", "expected", "without", "shown"),
+    [
+        (False, "glossy", "bare", "", "glossy"),
+        (False, "bare", "glossy", "", "glossy"),
+        (True, "glossy", "bare", "", "bare"),
+        (True, "bare", "glossy", "", "glossy"),
+        (True, "glossy", "broad", "", "glossy"),
+        (True, "glossy", "bare", "highlight-sampling", "glossy"),
+    ],
+)
+def test_where_highlights_are_expected_decides_of_a_part(guess, anywhere, expected, without, shown):
+    """What samples of all the object show, and those where highlights are expected; of an object either will do."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    problems = {
+        name: box.problem(element, direction, phi, psi, paint(element))
+        for name, phi, psi in (("bare", None, 0), ("glossy", 0.11, 0.08), ("broad", 0.3, 0.08))
+    }
+    names = list(problems)
+    maker = SimpleNamespace(
+        pick=lambda *_, highlights, **__: np.array([names.index(expected if highlights else anywhere)]),
+        problem=lambda index, rays: problems[names[index[0]]],
+    )
+    room = SimpleNamespace(settings=Settings(without=(without,)))
+    choice, problem, index = _by_frames(room, maker, 0, guess)
+    assert problem is problems[shown] and names[index[0]] == shown
+    assert choice.model == (LAMBERTIAN if shown == "bare" else DIELECTRIC)
