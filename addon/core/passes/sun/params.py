@@ -12,12 +12,15 @@ class SunParams:
     Attributes
     ----------
     gain : float
-        Share by which the differences of log albedo between neighbours on two sides of the patch's edge must fall. With
-        a sun five rooms gain .36 to .54 and two as a phone shows them .23 and .14 to .21 (half of what lies
-        along its edges is clipped); other directions, and twelve rooms without one, up to .1.
+        Share by which the differences of log albedo between neighbours on two sides of the patch's edge must fall: suns
+        .51 to .88, other directions up to .1.
     along : float
-        The same of all neighbours along the edge, also those on one side of it: suns .37 and .42, a sheet of paper .01,
-        the pool of a spotlight less than none.
+        The same of all neighbours along the edge, also those on one side of it: suns .33 to .63, sheets of paper .04
+        or less, the pool of a spotlight less than none.
+    beside : float
+        Or, where albedo does not explain what the patch reflects, the same of what is lit and the nearest in shade, off
+        the edge: suns .81 to .95 in ten runs of two rooms as a phone shows them (across the edge .11 to .37, along it
+        .00 to .10, as the shadows of a fused mesh lie a little off), other directions .06.
     reached : float
         Least share of what stands out that a direction must reach.
     kept, refined, tried : int
@@ -39,10 +42,14 @@ class SunParams:
         Elements that reflect more than this share of what they get are short of light.
     stands_out : float
         So may be those whose log albedo is so far above their object's median (2.7 times).
+    raised : float
+        How much a sun must raise log E of what it lights: suns 1.7 to 3.2, one behind clouds .5; what passes all else
+        in rooms without one .1 to .25.
     """
 
     gain: float = 0.12
     along: float = 0.05
+    beside: float = 0.5
     reached: float = 0.05
     kept: int = 160
     refined: int = 24
@@ -54,6 +61,7 @@ class SunParams:
     colour: float = 1.6
     over: float = 1.2
     stands_out: float = 1.0
+    raised: float = 0.4
 
 
 SUN = SunParams()

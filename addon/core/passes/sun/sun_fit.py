@@ -177,14 +177,19 @@ def find_sun(
             continue
         edges = Edges(spots(beside, irradiance(beside)))
         fit = _fit(edges, guess.direction)
-        before, after = edges.across(fit)
         lit = edges.spots.contribution(fit.direction, fit.radius)
         short = edges.spots.over() & (lit > 0)
         explained = short & ~edges.spots.over(lit, fit.strength)
         strengths = edges.strengths(fit.direction)
         # Paper in reach of a window differs across the edge of such a patch, but its own edges lie elsewhere.
-        alike = fit.cost < (1 - SUN.along) * edges.without_sun()
-        if alike and after < (1 - SUN.gain) * before and 2 * explained.sum() >= short.sum() and is_sunlike(strengths):
+        before, after = edges.across(fit)
+        alike = after < (1 - SUN.gain) * before and fit.cost < (1 - SUN.along) * edges.without_sun()
+        if not alike and explained.sum() >= LEVELS.few:
+            # Albedo does not explain it. A fused mesh's shadows lie a little off: light and shade are told beside them.
+            before, after = edges.beside(fit)
+            alike = after < (1 - SUN.beside) * before
+        bright = edges.spots.brighter(lit, fit.strength) > SUN.raised
+        if alike and bright and 2 * explained.sum() >= short.sum() and is_sunlike(strengths):
             direction = np.asarray(fit.direction, np.float32)
             return SolvedSun(Sun(direction, of_luminance(strengths), fit.radius, edges=(before, after)), even, edges)
     return None

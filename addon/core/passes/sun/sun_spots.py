@@ -104,6 +104,12 @@ class Spots:
         value = self.log_albedo()
         return self.over() | (value - self.sample.medians(value) > SUN.stands_out)
 
+    def brighter(self, contribution: np.ndarray, strength: float) -> float:
+        """Median log of the factor by which a sun raises E of what it lights; 0 if it lights nothing."""
+        lit = contribution > 0
+        received = np.maximum(self.sample.received[lit] @ LUMINANCE, 1e-12)
+        return float(np.median(np.log1p(strength * contribution[lit] / received))) if lit.any() else 0.0
+
     def contribution(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
         """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
         if radius:
@@ -181,9 +187,16 @@ class Edges:
         """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
         lit = self.spots.contribution(guess.direction) > 0
         two_sides = lit[self.a] != lit[self.b]
-        if not two_sides.any():
+        return self._compared(self.a[two_sides], self.b[two_sides], guess)
+
+    def beside(self, guess: Guess) -> tuple[float, float]:
+        """The same of what is lit and the nearest in shade, both off the edge."""
+        return self._compared(*self._two_sides(guess.direction, self.spots.contribution(guess.direction) > 0), guess)
+
+    def _compared(self, a: np.ndarray, b: np.ndarray, guess: Guess) -> tuple[float, float]:
+        """Mean difference between elements at `a` and `b` without the sun and with it; 0 if there are none."""
+        if not len(a):
             return 0.0, 0.0
-        a, b = self.a[two_sides], self.b[two_sides]
         left = self._differences(a, b, self.spots.contribution(guess.direction, guess.radius), guess.strength)
         return float(self._differences(a, b).mean()), float(left.mean())
 

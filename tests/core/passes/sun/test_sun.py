@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
@@ -329,6 +330,33 @@ def test_a_sun_is_found_by_a_patch_most_of_which_is_clipped(room, albedo):
     assert found is not None and angle(found.direction, sunny.TOWARDS) < 1.5
     assert found.irradiance @ LUMINANCE == pytest.approx(sunny.SUN @ LUMINANCE, rel=0.4)
     assert any("sun" in word for word in found.note.split())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off, seed", [(0.045, 2), (0.07, 0)])
+def test_a_sun_is_found_by_shadows_that_lie_a_little_off(off, seed):
+    """As those of a fused mesh do, by more than neighbours lie apart: across the edge they are hardly more alike."""
+    room = sunny.sunny_room(0.02)
+    rng, at = np.random.default_rng(seed), room.atlas.position
+    waves = np.sin(at @ rng.normal(0, 4, (6, 3)).T + rng.uniform(0, 2 * np.pi, 6))
+    beside = off * waves @ rng.normal(0, 6**-0.5, (6, 3))
+    place = np.concatenate([at, room.atlas.normal, 100 * room.atlas.object_id[:, None]], 1)
+    _, shown = cKDTree(place).query(place + np.pad(beside, ((0, 0), (0, 4))))
+    lit = measured(room, sunny.light(room, DARK_FLOOR)[shown], noise=0.1, texture=0.3, seed=seed)
+    patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
+    found = sun_by(room, clipped_at(lit, float(np.quantile(lit.radiance[patch].max(1), 0.2))))
+    assert found is not None and angle(found.direction, sunny.TOWARDS) < 2
+    assert 0.5 < found.irradiance @ LUMINANCE / (sunny.SUN @ LUMINANCE) < 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share, is_sun", [(0.08, True), (0.02, False)])
+def test_what_hardly_raises_the_light_is_no_sun(room, share, is_sun):
+    """Paper stands out; a sun behind clouds makes its patch twice as bright as what lies around it, a glow a fifth."""
+    L = sunny.light(room, sunny.ALBEDO | {0: 0.06}, sun=share * sunny.SUN)
+    sheet = (room.atlas.object_id == 0) & poster(room.atlas.position[:, :2], (0.2, 1.5), (0.6, 1.9))
+    L[sheet] *= 0.9 / 0.06
+    assert (run(room, L, texture=0.02).sun is not None) == is_sun
 
 
 def test_without_a_sun_what_is_clipped_is_none(room):
