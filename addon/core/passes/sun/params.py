@@ -20,7 +20,7 @@ class SunParams:
     beside : float
         Or, where albedo does not explain what the patch reflects, the same of what is lit and the nearest in shade, off
         the edge: suns .81 to .95 in ten runs of two rooms as a phone shows them (across the edge .11 to .37, along it
-        .00 to .10, as the shadows of a fused mesh lie a little off), other directions .06.
+        .00 to .10, as the shadows of a fused mesh lie a little off), other directions up to .17.
     reached : float
         Least share of what stands out that a direction must reach.
     kept, refined, tried : int
