@@ -40,7 +40,7 @@ class Sun:
     seen : bool
         False: solved for from the light that it throws.
     edges : (float, float), optional
-        Of one that was solved for: mean differences of log albedo across its edges, without it and with it.
+        Of one that was solved for: mean differences of log albedo between light and shade, without it and with it.
     """
 
     direction: np.ndarray
@@ -57,7 +57,7 @@ class Sun:
         before, after = self.edges
         return (
             f"A sun that no frame sees was solved from the patch of light that it throws: {self.where()} "
-            f"(differences of log albedo across its edges {before:.3f} to {after:.3f})."
+            f"(differences of log albedo between light and shade {before:.3f} to {after:.3f})."
         )
 
     def as_lists(self) -> dict[str, Any]:

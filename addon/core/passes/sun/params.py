@@ -13,11 +13,11 @@ class SunParams:
     ----------
     gain : float
         Share by which the differences of log albedo between neighbours on two sides of the patch's edge must fall: suns
-        .51 to .88, other directions up to .1.
+        .36 to .88, other directions, and twelve rooms without one, up to .1.
     along : float
         The same of all neighbours along the edge, also those on one side of it: suns .33 to .63, sheets of paper .04
         or less, the pool of a spotlight less than none.
-    beside : float
+    off_edge : float
         Or, where albedo does not explain what the patch reflects, the same of what is lit and the nearest in shade, off
         the edge: suns .81 to .95 in ten runs of two rooms as a phone shows them (across the edge .11 to .37, along it
         .00 to .10, as the shadows of a fused mesh lie a little off), other directions up to .17.
@@ -49,7 +49,7 @@ class SunParams:
 
     gain: float = 0.12
     along: float = 0.05
-    beside: float = 0.5
+    off_edge: float = 0.5
     reached: float = 0.05
     kept: int = 160
     refined: int = 24

@@ -185,11 +185,11 @@ def find_sun(
         before, after = edges.across(fit)
         alike = after < (1 - SUN.gain) * before and fit.cost < (1 - SUN.along) * edges.without_sun()
         if not alike and explained.sum() >= LEVELS.few:
-            # Albedo does not explain it. A fused mesh's shadows lie a little off: light and shade are told beside them.
-            before, after = edges.beside(fit)
-            alike = after < (1 - SUN.beside) * before
-        bright = edges.spots.brighter(lit, fit.strength) > SUN.raised
-        if alike and bright and 2 * explained.sum() >= short.sum() and is_sunlike(strengths):
+            # Albedo does not explain it. A fused mesh's shadows lie a little off: light and shade are told off them.
+            before, after = edges.off_edge(fit)
+            alike = after < (1 - SUN.off_edge) * before
+        raised = edges.spots.raised(lit, fit.strength) > SUN.raised
+        if alike and raised and 2 * explained.sum() >= short.sum() and is_sunlike(strengths):
             direction = np.asarray(fit.direction, np.float32)
             return SolvedSun(Sun(direction, of_luminance(strengths), fit.radius, edges=(before, after)), even, edges)
     return None

@@ -104,11 +104,10 @@ class Spots:
         value = self.log_albedo()
         return self.over() | (value - self.sample.medians(value) > SUN.stands_out)
 
-    def brighter(self, contribution: np.ndarray, strength: float) -> float:
-        """Median log of the factor by which a sun raises E of what it lights; 0 if it lights nothing."""
-        lit = contribution > 0
-        received = np.maximum(self.sample.received[lit] @ LUMINANCE, 1e-12)
-        return float(np.median(np.log1p(strength * contribution[lit] / received))) if lit.any() else 0.0
+    def raised(self, contribution: np.ndarray, strength: float) -> float:
+        """How much a sun raises log E of what it lights, in the median; 0 if it lights nothing."""
+        rise = (self.log_albedo() - self.log_albedo(contribution, strength))[contribution > 0]
+        return float(np.median(rise)) if len(rise) else 0.0
 
     def contribution(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
         """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
@@ -154,12 +153,12 @@ class Edges:
         bars and reveals alone nothing is as far from an edge, and what is nearer has to do.
         """
         for margin in (SUN.margin, SUN.margin / 2, SUN.margin / 4):
-            a, b = self._off_edge(direction, lit, margin)
+            a, b = self._by_margin(direction, lit, margin)
             if len(a) >= LEVELS.enough:
                 break
         return a, b
 
-    def _off_edge(self, direction: np.ndarray, lit: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    def _by_margin(self, direction: np.ndarray, lit: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         spots = self.spots
         lit_around = spots.lit_around(direction, margin)
         bright = np.flatnonzero(lit & lit_around.all(0))
@@ -189,7 +188,7 @@ class Edges:
         two_sides = lit[self.a] != lit[self.b]
         return self._compared(self.a[two_sides], self.b[two_sides], guess)
 
-    def beside(self, guess: Guess) -> tuple[float, float]:
+    def off_edge(self, guess: Guess) -> tuple[float, float]:
         """The same of what is lit and the nearest in shade, both off the edge."""
         return self._compared(*self._two_sides(guess.direction, self.spots.contribution(guess.direction) > 0), guess)
 

@@ -349,6 +349,14 @@ def test_a_sun_is_found_by_shadows_that_lie_a_little_off(off, seed):
     assert 0.5 < found.irradiance @ LUMINANCE / (sunny.SUN @ LUMINANCE) < 2
 
 
+def test_how_much_a_sun_raises_the_light_is_told_where_it_falls(room):
+    """Three elements of ten get three times as much by it."""
+    field, element = room.field(np.ones((len(room.atlas), 3), np.float32), sky_map()), np.arange(10)
+    spots = Spots(field, element, np.full((10, 3), 0.5), room.atlas.object_id, np.zeros(len(room.atlas), bool))
+    assert spots.raised(np.where(element < 3, 0.25, 0), 4.0) == pytest.approx(np.log(3))
+    assert spots.raised(np.zeros(10), 4.0) == 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share, is_sun", [(0.08, True), (0.02, False)])
 def test_what_hardly_raises_the_light_is_no_sun(room, share, is_sun):
