@@ -122,7 +122,8 @@ class Grower:
             if not closer.any() or (closer == near).all():
                 break
             near = closer
-        self.tried[region[near]] = True
+        nothing_new = self.tried[region[near]].all()
+        self.tried[region if nothing_new else region[near]] = True
         return region[near]
 
     def _reached(self, seed: int) -> np.ndarray:
