@@ -14,8 +14,9 @@ class Radiometry:
 
     Attributes
     ----------
-    response : (3, m) float
-        Inverse camera response: linear light at m codes, evenly from 0 to the greatest, Rec.709 red, green, blue.
+    response : (3, m) float32
+        Inverse camera response: linear light at m codes, evenly from 0 to the greatest, Rec.709 red, green, blue. With
+        65536 they hold the codes of 8 and of 16 bits.
     gain : (3,) float
         Exposure times white balance.
     falloff : (2,) float
@@ -27,10 +28,17 @@ class Radiometry:
     falloff: np.ndarray
 
     def radiance(self, codes: np.ndarray, r2: np.ndarray) -> np.ndarray:
-        """Linear radiance ((..., 3) float32) of codes in 0...1 ((..., 3)) at squared distances `r2` ((...))."""
-        codes_of_response = np.linspace(0, 1, self.response.shape[1])
-        linear = np.stack([np.interp(codes[..., c], codes_of_response, self.response[c]) for c in range(3)], -1)
-        return (linear / (vignetting(r2, self.falloff)[..., None] * self.gain)).astype(np.float32)
+        """Linear radiance ((..., 3) float32) of codes in 0...1 ((..., 3) float32) at squared distances `r2` ((...))."""
+        nearest = np.rint(codes * np.float32(self.response.shape[1] - 1)).astype(np.intp)
+        linear = np.stack([self.response[c].take(nearest[..., c]) for c in range(3)], -1)
+        attenuation = vignetting(r2.astype(np.float32), self.falloff.astype(np.float32))
+        return linear / (attenuation[..., None] * self.gain.astype(np.float32))
+
+
+def at_16_bits(response: np.ndarray) -> np.ndarray:
+    """A response between its m codes, (3, m) -> (3, 65536) float32."""
+    codes, codes_16 = np.linspace(0, 1, response.shape[1]), np.linspace(0, 1, 1 << 16)
+    return np.stack([np.interp(codes_16, codes, channel) for channel in response]).astype(np.float32)
 
 
 def vignetting(r2: np.ndarray, falloff: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from ...photo import srgb_to_linear
 from ...progress import Progress, Rounds
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.params import VISIBILITY
-from ...scene.radiometry import CODES, Radiometry
+from ...scene.radiometry import CODES, Radiometry, at_16_bits
 from ...scene.rays import RayScene
 from ...significance import LEVELS, SIGMA_OF_MAD
 from .observations import CodeObservations, observe_codes
@@ -39,7 +39,7 @@ class Calibration:
     Attributes
     ----------
     response : (3, 256) float64
-        Inverse camera response, as in `Radiometry`.
+        Inverse camera response at the codes of 8 bits, as in `Radiometry`.
     gain : (f, 3) float64
         Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame fixes the unit.
     falloff : (2,) float64
@@ -64,8 +64,9 @@ class Calibration:
 
     def of(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
         """The frames with their radiometry."""
+        response = at_16_bits(self.response)
         return tuple(
-            replace(frame, radiometry=Radiometry(self.response, gain, self.falloff)) if known else frame
+            replace(frame, radiometry=Radiometry(response, gain, self.falloff)) if known else frame
             for frame, gain, known in zip(frames, self.gain, self.calibrated, strict=True)
         )
 
