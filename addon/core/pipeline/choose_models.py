@@ -16,11 +16,13 @@ from ..light.lamps import Lamp
 from ..light.lobes import LobeLight
 from ..paper.target_frame import frame_scores, target_frame
 from ..parallel import ordered_map
+from ..passes.albedo.albedo import quotient
+from ..passes.albedo.params import ALBEDO
 from ..passes.see_through.see_through import is_sure, judge, look_behind
 from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.given import fit_given
 from ..passes.specular.intervals import GlossInterval, gloss_interval
-from ..passes.specular.models import Choice, adopt_from_class, choose_model, set_apart
+from ..passes.specular.models import Choice, adopt_from_class, choose_model, set_apart, share_paint
 from ..passes.specular.one_colour import Coated, OneColour, compare, compare_coat
 from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
@@ -29,6 +31,7 @@ from ..results.overrides import Given
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
+from ..scene.shape_parts import WALL
 from ..settings import Settings
 from ..significance import LEVELS, SIGMA_OF_MAD
 
@@ -155,16 +158,32 @@ def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     problems = {i: looked.problem for i, looked in looks.items() if looked.problem is not None}
     targets = {i: looked.target for i, looked in looks.items()}
     if "class-lobes" not in room.settings.without:
-        # That two parts are walls by their shape says nothing of what they are painted with.
+        # That two parts are walls by their shape says nothing of what they are painted with; a common colour does.
         named_ids = {instance.object_id for instance in room.instances if not instance.guess}
         reflecting = {i: choice for i, choice in choices.items() if i in named_ids and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
+        walls = {i: choices[i] for i in _guessed_walls(room) if i in choices and i not in room.given}
+        adopted |= share_paint(walls, problems, {i: _log_albedo(room, i) for i in walls})
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
     order = sorted(looks, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
     intervals = ordered_map(
         lambda i: gloss_interval(choices[i], problems.get(i)), order, room.settings.threads, ahead=len(order)
     )
     return Chosen(choices, problems, targets, dict(zip(order, intervals, strict=True)))
+
+
+def _guessed_walls(room: Room) -> list[int]:
+    """The seen parts that are walls by their shape."""
+    seen = set(np.unique(room.field.atlas.object_id[room.lit_diffuse.seen]).tolist())
+    return [i.object_id for i in room.instances if i.guess and i.class_name == WALL and i.object_id in seen]
+
+
+def _log_albedo(room: Room, object_id: int) -> np.ndarray:
+    """Logarithm of an object's median albedo, (3,)."""
+    elements = room.field.atlas.elements_of(object_id)
+    elements = elements[room.lit_diffuse.seen[elements]]
+    rho, valid = quotient(room.lit_diffuse.radiance[elements], room.irradiance[elements])
+    return np.log(np.maximum(np.median(rho[valid], 0), ALBEDO.floor)) if valid.any() else np.zeros(3)
 
 
 def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:

@@ -18,7 +18,7 @@ from ..significance import LEVELS
 from .model import Frame, Mesh, Pixels
 from .params import CLOSING, PARTS
 from .rays import RayScene
-from .shape_parts import Parts, Plane, plane_gap
+from .shape_parts import WALL, Parts, Plane, plane_gap
 from .sight import RadianceBeyond, Sight, between_frames, colours, sight_of
 
 AT_ONCE: Block[int] = 1 << 18
@@ -176,7 +176,7 @@ def _cells_to_close(
     cells = []
     for grid, closed_cells, seen_cells in by_grid:
         grid_closed, seen = _with_specks_closed(grid.mask(closed_cells), grid.open), grid.mask(seen_cells)
-        if grid.plane.name == "wall":
+        if grid.plane.name == WALL:
             grid_closed = _with_windows_whole(grid_closed, seen, grid.open)
         cells.append((grid_closed, seen))
     return cells
@@ -251,7 +251,7 @@ def plane_grids(
     extent = np.concatenate(
         [corners[plane.faces].reshape(-1, 3) for plane in outer if len(plane.faces)] or [corners[0]]
     )
-    walls = [plane.normal for plane in outer if plane.name == "wall"]
+    walls = [plane.normal for plane in outer if plane.name == WALL]
     grids = []
     for number, plane in enumerate([*outer, *inner]):
         bounds = number < len(outer)
@@ -306,14 +306,14 @@ def outermost(corners: np.ndarray, planes: Sequence[Plane], gap: float, viewpoin
                     key=lambda candidate: len(candidate.faces),
                 )
             )
-    walls = [plane for plane in bounds if plane.name == "wall"]
-    level = [plane for plane in bounds if plane.name != "wall"]
+    walls = [plane for plane in bounds if plane.name == WALL]
+    level = [plane for plane in bounds if plane.name != WALL]
     alone = [wall for wall in walls if all(wall.normal @ other.normal > -np.cos(PARTS.tilt) for other in walls)]
     if len(level) == 2 and len(walls) > 2 and len(alone) == 1:
         normal = -alone[0].normal
         points = corners[np.concatenate([plane.faces for plane in level])].reshape(-1, 3)
         depth = min((points @ normal).min(), np.quantile(viewpoints @ normal, 1 - PARTS.outer))
-        bounds.append(Plane(normal, depth * normal, np.zeros(0, int), name="wall"))
+        bounds.append(Plane(normal, depth * normal, np.zeros(0, int), name=WALL))
     return bounds
 
 

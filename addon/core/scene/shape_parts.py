@@ -13,12 +13,16 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..kinds import Code
 from .connected_parts import connected_parts, to_nearest
 from .model import Mesh
 from .params import PARTS, SURFACE
 from .sphere import fibonacci
 from .uv_islands import components
 from .weld import weld
+
+WALL: Code[str] = "wall"
+"""What upright planes are called that the room lies in front of."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +212,7 @@ def _name(plane: Plane, faces: _Faces, gap: float) -> str:
         return ""
     up, slant = plane.normal[2], np.sin(PARTS.tilt)
     if abs(up) < slant:
-        return "wall"
+        return WALL
     return ("floor" if up > 0 else "ceiling") if abs(up) > np.cos(PARTS.tilt) else ""
 
 

@@ -17,18 +17,34 @@ from tests.core.fit.test_fit import paint
 from tests.core.glossy_box import Box
 
 
-@pytest.mark.parametrize("guess", [False, True])
-def test_a_class_that_shape_alone_tells_shares_no_lobe(guess):
-    """A glossy wall, and one whose few frames tell no lobe: alike if the capture told that they are of a class."""
+@pytest.mark.parametrize(
+    ("guess", "name", "second", "without", "shared"),
+    [
+        (False, "wall", 0.2, "", True),
+        (False, "wall", 0.6, "", True),
+        (True, "wall", 0.2, "", False),
+        (True, "wall", 0.6, "", True),
+        (True, "wall", 0.6, "class-lobes", False),
+        (True, "part", 0.6, "", False),
+    ],
+)
+def test_a_class_that_shape_alone_tells_shares_no_lobe_but_walls_of_one_colour_do(guess, name, second, without, shared):
+    """A glossy wall of albedo .6, and one whose few frames tell no lobe, whose albedo is .6 or another."""
     box = Box()
     element, direction, _ = box.views(60, 10)
     glossy = box.problem(element, direction, 0.11, 0.08, paint(element))
     few = np.isin(element, np.unique(element)[:5])
     looked = {i: Looked(choose_model(one), one, -1) for i, one in enumerate((glossy, glossy.part(few)))}
-    instances = tuple(Instance(i, "wall", guess=guess) for i in looked)
-    room = Room(instances, None, None, None, None, [])
+    instances = tuple(Instance(i, name, guess=guess) for i in looked)
+    owner = np.repeat([0, 1], 20)
+    atlas = SimpleNamespace(object_id=owner, elements_of=lambda i: np.flatnonzero(owner == i))
+    lit_diffuse = SimpleNamespace(seen=np.arange(40) % 4 > 0, radiance=np.where(owner == 0, 0.6, second)[:, None] * 2)
+    lit_diffuse.radiance = np.where(lit_diffuse.seen[:, None], lit_diffuse.radiance, np.nan) * np.ones(3)
+    irradiance = np.full((40, 3), 2 * np.pi)
+    settings = Settings(without=(without,) if without else ())
+    room = Room(instances, SimpleNamespace(atlas=atlas), lit_diffuse, irradiance, None, [], settings=settings)
     models = [choice.model for choice in choose_models(room, looked).choices.values()]
-    assert models == [DIELECTRIC, LAMBERTIAN if guess else DIELECTRIC]
+    assert models == [DIELECTRIC, DIELECTRIC if shared else LAMBERTIAN]
 
 
 @pytest.mark.parametrize(

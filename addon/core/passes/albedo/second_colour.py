@@ -72,7 +72,7 @@ def shrunk_to_second_colour(
     for_blocks(mark, len(neighbours), BLOCK, 0)
     share = other.mean(1)
     real = np.clip(1 - SECOND_COLOUR.by_chance / np.maximum(share, 1e-9), 0, 1)
-    result = shrunk.copy()
+    result, log_reference = shrunk.copy(), np.log(reference)
     todo = np.flatnonzero(real[cell] > 0)
 
     def draw(part: slice) -> None:
@@ -91,7 +91,7 @@ def shrunk_to_second_colour(
         )
         of_ground += SECOND_COLOUR.unexplained
         total = of_ground + of_other.sum(1)
-        drawn = (of_other[:, :, None] * np.log(colours)).sum(1)
+        drawn = np.einsum("mk,mkc->mc", of_other, log_reference[neighbours[at]])
         trust = (SECOND_COLOUR.apart**2 / (SECOND_COLOUR.apart**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[elements] = (of_ground[:, None] * shrunk[elements] + as_other) / total[:, None]
@@ -102,7 +102,11 @@ def shrunk_to_second_colour(
 
 def _squared_difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Squared relative difference of two colours: that of their lengths where they are of one hue."""
-    return ((a - b) ** 2).sum(-1) / np.sqrt((a**2).sum(-1) * (b**2).sum(-1))
+    return _squared_length(a - b) / np.sqrt(_squared_length(a) * _squared_length(b))
+
+
+def _squared_length(a: np.ndarray) -> np.ndarray:
+    return np.einsum("...c,...c", a, a)
 
 
 def _normal_density(square: np.ndarray, variance: np.ndarray) -> np.ndarray:

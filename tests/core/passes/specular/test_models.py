@@ -12,7 +12,7 @@ from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
 from addon.core.passes.specular import models
-from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, gain_of, metal_f0
+from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, gain_of, metal_f0, share_paint
 from addon.core.passes.specular.one_colour import Coated
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import Box
@@ -285,3 +285,46 @@ def test_one_that_errs_does_not_make_its_class_glossy(seen):
     choices |= {i: Choice(LAMBERTIAN, fit, -0.01, -0.5, "Not sure.") for i in range(1, 12)}
     result = adopt_from_class(choices, {}, dict.fromkeys(choices, "cupboard"))
     assert [choice.model for choice in result.values()] == [DIELECTRIC, *[LAMBERTIAN] * 11]
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "glossy"),
+    [
+        ((2.5, 1.4, 2.7, 4.2), (True, True, True, True)),  # tiles
+        ((2.3, -0.5, -0.4, -1.2), (False, False, False, False)),  # matt paint
+        ((13.8, 1.1, -0.4, -0.8), (True, False, False, False)),  # the first is full of cupboards
+        ((2.5, 3.5, -8.0, 2.9), (True, True, False, True)),  # the third is sure that it is matt
+    ],
+    ids=["one is unsure", "one by chance", "one sure", "another sure"],
+)
+def test_walls_of_one_colour_decide_together(seen, sigmas, glossy):
+    fit = choose_model(seen["glossy"]).fit
+    walls = {
+        i: Choice(DIELECTRIC if s > 2 else LAMBERTIAN, replace(fit, phi=fit.phi + 0.01 * i), 0.01 * s, s)
+        for i, s in enumerate(sigmas)
+    }
+    result = share_paint(walls, {}, dict.fromkeys(walls, np.log([0.6, 0.62, 0.65])))
+    assert tuple(choice.model == DIELECTRIC for choice in result.values()) == glossy
+
+
+def test_walls_of_another_colour_or_not_seen_enough(seen):
+    """2 was seen too little to look for a highlight; 3 is of another colour, and does not gain enough by itself."""
+    fit = choose_model(seen["glossy"]).fit
+    walls = {0: Choice(DIELECTRIC, fit, 0.04, 4.0), 1: Choice(DIELECTRIC, fit, 0.04, 5.0), 2: Choice(LAMBERTIAN, None)}
+    walls[3] = Choice(LAMBERTIAN, fit, 0.01, 1.9)
+    white, blue = np.log([0.8, 0.8, 0.8]), np.log([0.2, 0.3, 0.7])
+    result = share_paint(walls, {}, {0: white, 1: white + 0.05, 2: white - 0.03, 3: blue})
+    assert [choice.model for choice in result.values()] == [DIELECTRIC, DIELECTRIC, DIELECTRIC, LAMBERTIAN]
+    assert result[2].fit.phi == fit.phi and "colour" in result[2].note and result[3] is walls[3]
+    assert share_paint({}, {}, {}) == {} and share_paint({3: walls[3]}, {}, {3: blue}) == {3: walls[3]}
+
+
+def test_walls_of_one_paint_share_its_lobe(seen):
+    """The surest's, but for one whose own explains its frames significantly better."""
+    own = choose_model(seen["glossy"])
+    broad = replace(own, fit=replace(own.fit, phi=0.4), sigmas=4.0)
+    white = dict.fromkeys((0, 1), np.log([0.8, 0.8, 0.8]))
+    result = share_paint({0: replace(own, sigmas=9.0), 1: broad}, {0: seen["glossy"], 1: seen["glossy"]}, white)
+    assert result[0].fit.phi == result[1].fit.phi == own.fit.phi
+    result = share_paint({0: replace(own, sigmas=4.0), 1: replace(broad, sigmas=9.0)}, {0: seen["glossy"]}, white)
+    assert result[0].fit.phi == own.fit.phi and result[1].fit.phi == 0.4
