@@ -279,8 +279,8 @@ def share_paint(
     Stouffer's combined z-score. One that is sure stays what it is, and counts no more than that: it may hold cupboards.
     Where they are glossy they share the lobe, but for one whose own fits significantly better.
 
-    Eleven phone-made rooms, three seeds each: of walls' 340 square metres that are glossy 228 are told, 179 without; of
-    those that are matt 46 are called glossy, 56 without; roughness of bathrooms' tiles is off by .07, .11 without.
+    Twelve phone-made rooms, three seeds each: of 370 square metres of walls that are glossy 243 are called so, 193
+    without; of 1663 that are matt 82, 101 without. Tiles' roughness is off by .07, .11 without.
 
     Parameters
     ----------
