@@ -162,8 +162,9 @@ def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
         named_ids = {instance.object_id for instance in room.instances if not instance.guess}
         reflecting = {i: choice for i, choice in choices.items() if i in named_ids and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
-        walls = {i: choices[i] for i in _guessed_walls(room) if i in choices and i not in room.given}
-        adopted |= share_paint(walls, problems, {i: _log_albedo(room, i) for i in walls})
+        colours = _wall_colours(room)
+        walls = {i: choices[i] for i in colours if i in choices and i not in room.given}
+        adopted |= share_paint(walls, problems, colours)
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
     order = sorted(looks, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
     intervals = ordered_map(
@@ -172,18 +173,17 @@ def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     return Chosen(choices, problems, targets, dict(zip(order, intervals, strict=True)))
 
 
-def _guessed_walls(room: Room) -> list[int]:
-    """The seen parts that are walls by their shape."""
-    seen = set(np.unique(room.field.atlas.object_id[room.lit_diffuse.seen]).tolist())
-    return [i.object_id for i in room.instances if i.guess and i.class_name == WALL and i.object_id in seen]
-
-
-def _log_albedo(room: Room, object_id: int) -> np.ndarray:
-    """Logarithm of an object's median albedo, (3,)."""
-    elements = room.field.atlas.elements_of(object_id)
-    elements = elements[room.lit_diffuse.seen[elements]]
-    rho, valid = quotient(room.lit_diffuse.radiance[elements], room.irradiance[elements])
-    return np.log(np.maximum(np.median(rho[valid], 0), ALBEDO.floor)) if valid.any() else np.zeros(3)
+def _wall_colours(room: Room) -> dict[int, np.ndarray]:
+    """Logarithm of the median albedo, (3,), of each part that is a wall by its shape, where any of it was seen."""
+    colours: dict[int, np.ndarray] = {}
+    for instance in room.instances:
+        if instance.guess and instance.class_name == WALL:
+            elements = room.field.atlas.elements_of(instance.object_id)
+            elements = elements[room.lit_diffuse.seen[elements]]
+            rho, valid = quotient(room.lit_diffuse.radiance[elements], room.irradiance[elements])
+            if valid.any():
+                colours[instance.object_id] = np.log(np.maximum(np.median(rho[valid], 0), ALBEDO.floor))
+    return colours
 
 
 def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:
