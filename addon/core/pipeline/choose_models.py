@@ -22,7 +22,8 @@ from ..passes.see_through.see_through import is_sure, judge, look_behind
 from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.given import fit_given
 from ..passes.specular.intervals import GlossInterval, gloss_interval
-from ..passes.specular.models import Choice, adopt_from_class, choose_model, set_apart, share_paint
+from ..passes.specular.models import Choice, choose_model, set_apart
+from ..passes.specular.of_class import adopt_from_class, share_paint
 from ..passes.specular.one_colour import Coated, OneColour, compare, compare_coat
 from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems

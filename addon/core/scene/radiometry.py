@@ -36,9 +36,9 @@ class Radiometry:
 
 
 def at_16_bits(response: np.ndarray) -> np.ndarray:
-    """A response between its m codes, (3, m) -> (3, 65536) float32."""
-    codes, codes_16 = np.linspace(0, 1, response.shape[1]), np.linspace(0, 1, 1 << 16)
-    return np.stack([np.interp(codes_16, codes, channel) for channel in response]).astype(np.float32)
+    """A response at the codes of 16 bits, from those of 8, (3, 256) -> (3, 65536) float32."""
+    codes = np.linspace(0, 1, 1 << 16)
+    return np.stack([np.interp(codes, CODES, channel) for channel in response]).astype(np.float32)
 
 
 def vignetting(r2: np.ndarray, falloff: np.ndarray) -> np.ndarray:

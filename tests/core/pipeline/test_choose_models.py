@@ -38,9 +38,9 @@ def test_a_class_that_shape_alone_tells_shares_no_lobe_but_walls_of_one_colour_d
     instances = tuple(Instance(i, name, guess=guess) for i in looked)
     owner = np.repeat([0, 1], 20)
     atlas = SimpleNamespace(object_id=owner, elements_of=lambda i: np.flatnonzero(owner == i))
-    lit_diffuse = SimpleNamespace(seen=np.arange(40) % 4 > 0, radiance=np.where(owner == 0, 0.6, second)[:, None] * 2)
-    lit_diffuse.radiance = np.where(lit_diffuse.seen[:, None], lit_diffuse.radiance, np.nan) * np.ones(3)
-    irradiance = np.full((40, 3), 2 * np.pi)
+    seen, irradiance = np.arange(40) % 4 > 0, np.full((40, 3), 2 * np.pi)
+    radiance = np.where(seen, 2 * np.where(owner == 0, 0.6, second), np.nan)[:, None] * np.ones(3)
+    lit_diffuse = SimpleNamespace(seen=seen, radiance=radiance)
     settings = Settings(without=(without,) if without else ())
     room = Room(instances, SimpleNamespace(atlas=atlas), lit_diffuse, irradiance, None, [], settings=settings)
     models = [choice.model for choice in choose_models(room, looked).choices.values()]

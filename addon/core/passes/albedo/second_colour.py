@@ -78,12 +78,12 @@ def shrunk_to_second_colour(
     def draw(part: slice) -> None:
         elements = todo[part]
         at = cell[elements]
-        colours, value = reference[neighbours[at]], rho[elements]
+        index, value = neighbours[at], rho[elements]
         local = (SECOND_COLOUR.local * error[elements]) ** 2
         of_ground = (1 - real[at] * share[at]) * _normal_density(
             _squared_difference(value, ground[at]), local + width[at] ** 2
         )
-        distance = _squared_difference(value[:, None], colours)
+        distance = _squared_difference(value[:, None], reference[index])
         of_other = (
             (real[at] / neighbours.shape[1])[:, None]
             * other[at]
@@ -91,7 +91,7 @@ def shrunk_to_second_colour(
         )
         of_ground += SECOND_COLOUR.unexplained
         total = of_ground + of_other.sum(1)
-        drawn = np.einsum("mk,mkc->mc", of_other, log_reference[neighbours[at]])
+        drawn = np.einsum("mk,mkc->mc", of_other, log_reference[index])
         trust = (SECOND_COLOUR.apart**2 / (SECOND_COLOUR.apart**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[elements] = (of_ground[:, None] * shrunk[elements] + as_other) / total[:, None]

@@ -122,6 +122,7 @@ class Grower:
             if not closer.any() or (closer == near).all():
                 break
             near = closer
+        # What a region leaves out that was tried before is tried, too: each such triangle would only grow it once more.
         nothing_new = self.tried[region[near]].all()
         self.tried[region if nothing_new else region[near]] = True
         return region[near]

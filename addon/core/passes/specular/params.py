@@ -49,7 +49,7 @@ FIT = FitParams()
 
 @dataclass(frozen=True)
 class ChoiceParams:
-    """When a lobe, or a metal, is accepted (`models`).
+    """When a lobe, or a metal, is accepted (`models`, `of_class`).
 
     Attributes
     ----------

@@ -11,8 +11,9 @@ from addon.core.brdf.dielectric import DIELECTRIC, MAX_F0
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
-from addon.core.passes.specular import models
-from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, gain_of, metal_f0, share_paint
+from addon.core.passes.specular import models, of_class
+from addon.core.passes.specular.models import Choice, choose_model, gain_of, metal_f0
+from addon.core.passes.specular.of_class import adopt_from_class, share_paint
 from addon.core.passes.specular.one_colour import Coated
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import Box
@@ -240,7 +241,7 @@ def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
     """How the diffuse part darkens towards grazing views is an object's own matter, with a lobe as without one."""
     sure, diffuse = choose_model(seen["glossy"]), choose_model(seen["diffuse"])
     asked = []
-    monkeypatch.setattr(models, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
+    monkeypatch.setattr(of_class, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
     own = replace(diffuse, fit=replace(diffuse.fit, kappa=0.6))
     source = replace(sure, fit=replace(sure.fit, kappa=0.3))
     result = adopt_from_class({0: source, 1: own}, {1: seen["diffuse"]}, {0: "floor", 1: "floor"})

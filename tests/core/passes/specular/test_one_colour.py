@@ -12,7 +12,8 @@ from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.passes.specular.by_looks import coated_by_looks, metal_by_looks
 from addon.core.passes.specular.intervals import gloss_interval
-from addon.core.passes.specular.models import Choice, adopt_from_class
+from addon.core.passes.specular.models import Choice
+from addon.core.passes.specular.of_class import adopt_from_class
 from addon.core.passes.specular.one_colour import compare, compare_coat
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import WALLS, Box
