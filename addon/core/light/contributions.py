@@ -25,7 +25,8 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
     for k, objects in enumerate(groups):
         alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1)
         lit_alone = field.with_light(alone, Environment.dark(), objects)
-        one_sided |= lit_alone.one_sided
+        own = np.isin(field.mesh.object_id, objects)
+        one_sided[own] = lit_alone.one_sided[own]
         aimed = shining(lit_alone)
         density[aimed.triangle] = aimed.density[aimed.triangle]
 

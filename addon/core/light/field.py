@@ -34,7 +34,8 @@ class LightField:
         Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
         lamp that is a bare rectangle under a ceiling does not light the gap above it. So does each side of a sheet
         that has two (`Mesh.backs`). In a mesh without objects a lamp that `bulges` shines on both: what lacks of a
-        bulb, as no frame saw it, shines too, and its inside does in its stead.
+        bulb, as no frame saw it, shines too, and its inside does in its stead. All else of such a mesh is dark from
+        behind: a ray that meets a back came in by a hole where no frame looked, and it is dark inside of things.
     lookup : ElementLookup, optional
         Of this mesh and atlas, if there is one already.
     """
@@ -94,13 +95,14 @@ class LightField:
         return field
 
     def _set_lamps(self, lamps: Iterable[int]) -> None:
-        one_sided = list(lamps)
         if self.mesh.whole:
             normal, area = self.mesh.geometry
-            triangles = {lamp: self.mesh.object_id == lamp for lamp in one_sided}
-            one_sided = [lamp for lamp, own in triangles.items() if not bulges(normal[own], area[own])]
-        self.one_sided = np.isin(self.mesh.object_id, one_sided)
-        self._lamps = bool(self.one_sided.any())
+            triangles = {lamp: self.mesh.object_id == lamp for lamp in lamps}
+            bulging = [lamp for lamp, own in triangles.items() if bulges(normal[own], area[own])]
+            self.one_sided = ~np.isin(self.mesh.object_id, bulging)
+        else:
+            self.one_sided = np.isin(self.mesh.object_id, list(lamps))
+        self._dark_backs = bool(self.one_sided.any())
         if self.mesh.backs is not None:  # rays meet no side from behind, but are aimed at points on either
             self.one_sided[self.mesh.backs] = True
             self.one_sided[len(self.mesh.triangles) - len(self.mesh.backs) :] = True
@@ -199,17 +201,17 @@ class LightField:
         return radiance
 
     def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None) -> np.ndarray:
-        """L_d at hits, the environment where rays escape; lamps are dark from behind."""
+        """L_d at hits, the environment where rays escape; what is `one_sided` is dark from behind."""
         radiance = self.radiance.take(element, 0)  # indexing by arrays takes several times as long
         escaped = np.flatnonzero(element < 0)
         if len(escaped):
             start = None if origins is None else origins.take(escaped, 0)
             radiance[escaped] = self.outside(start, directions.take(escaped, 0))
-        lamp = np.flatnonzero(self.one_sided.take(hits.triangle) & (element >= 0)) if self._lamps else ()
-        if len(lamp):
-            normal = self.normal.take(hits.triangle.take(lamp), 0)
-            behind = np.einsum("ij,ij->i", directions.take(lamp, 0), normal) > 0
-            radiance[lamp[behind]] = 0
+        front = np.flatnonzero(self.one_sided.take(hits.triangle) & (element >= 0)) if self._dark_backs else ()
+        if len(front):
+            normal = self.normal.take(hits.triangle.take(front), 0)
+            behind = np.einsum("ij,ij->i", directions.take(front, 0), normal) > 0
+            radiance[front[behind]] = 0
         return radiance
 
     def onward(self, hits: Hits, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ what paint reflects. Colour is told by the light, which is white from outside. A
 log, by L-BFGS.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,13 @@ class Unknown:
         """E from all of them at radiances and a factor ((k + s, 3)), (m, 3) float64."""
         k = self.contribution.shape[1]
         return self.contribution @ radiance[:k] + (self.by_sun * radiance[k:]).sum(1)
+
+    def part(self, which: np.ndarray) -> "Unknown":
+        """Some of them alone ((k + s,) bool)."""
+        k = self.contribution.shape[1]
+        return Unknown(
+            self.contribution[:, which[:k]], self.by_sun[:, which[k:]], self.lower[which], self.expected[which]
+        )
 
     def transposed(self, values: np.ndarray) -> np.ndarray:
         """Sums of values ((m, 3)) over the elements as each contributes to them, (k + s, 3) float64."""
@@ -150,3 +158,27 @@ def solve(
         return float(np.median(np.abs(a[pairs[:, 0]] - a[pairs[:, 1]])))
 
     return np.exp(log_radiance), (spread(cost.expected), spread(log_radiance))
+
+
+def solve_for_some(
+    sent: np.ndarray,
+    received: np.ndarray,
+    unknown: Unknown,
+    pairs: np.ndarray,
+    believed: Callable[[np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """As `solve`; sources that are not `believed` keep their lower bound, and the others are solved for once more.
+
+    Parameters
+    ----------
+    believed : callable
+        Of radiances and factor ((k + s, 3)), the sources that may have them, (k + s,) bool.
+    """
+    free, radiance = np.ones(len(unknown.lower), bool), unknown.lower.copy()
+    while True:
+        held = unknown.part(~free)
+        radiance[free], spread = solve(sent, received + held.irradiance(held.lower), unknown.part(free), pairs)
+        left = free & believed(radiance)
+        if (left == free).all():
+            return radiance, spread
+        free, radiance = left, unknown.lower.copy()

@@ -165,3 +165,19 @@ def test_more_rays_at_a_few_elements_leave_less_noise():
         return float(np.std([irradiance_at(field, some, seed, more)[:, 0] for seed in range(6)], 0).mean())
 
     assert noise(4) < 0.7 * noise(1)
+
+
+def test_a_back_that_rays_meet_is_dark_in_a_mesh_without_objects():
+    """A board off a floor that no frame saw from below: a scan lacks its other side, a model may not have one."""
+    over = quad((-0.5, -0.5, 0.3), (1, 0, 0), (0, 1, 0), 1)
+    room = make_room([quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), 0), over], 0.1)
+    floor = np.flatnonzero(room.atlas.object_id == 0)
+    position, normal = room.atlas.position[floor], room.atlas.normal[floor]
+    factor = polygon_irradiance(position, normal, [replace(over, edge_u=over.edge_v, edge_v=over.edge_u)])[:, 0]
+    for scan, sky in ((False, 0), (True, 0), (False, 1), (True, 1)):
+        one = replace(room, mesh=replace(room.mesh, whole=scan))
+        env = Environment(np.full((8, 16, 3), sky, np.float32), np.ones((8, 16), np.int32))
+        field = one.field(one.by_object({1: (2, 2, 2)})).with_light(one.by_object({1: (2, 2, 2)}), env)
+        true = sky * (np.pi - factor) + (0 if scan else 2) * factor
+        assert np.abs(irradiance_at(field, floor, 0)[:, 0] - true).max() < 0.15 * np.pi
+        assert irradiance_at(field, floor, 0)[:, 0].mean() == pytest.approx(true.mean(), rel=0.02, abs=1e-6)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.light.joint_fit import Unknown, solve
+from addon.core.light.joint_fit import Unknown, solve, solve_for_some
 
 
 def test_a_few_elements_that_hold_a_lamps_light_decide_nothing():
@@ -49,3 +49,21 @@ def test_green_where_the_sun_throws_most_light_is_paint():
     pairs = rng.integers(0, m, (8 * m, 2))
     found, _ = solve(sent, np.ones((m, 3)), unknown, pairs)
     assert found[-1] == pytest.approx(found[-1].mean() * np.ones(3), rel=0.15) and 1.3 < found[-1].mean() < 3
+
+
+def test_a_source_that_is_not_believed_keeps_what_was_measured_and_the_rest_makes_up_for_it():
+    """A highlight lies where a lamp lights most, so it would take some of the lamp's light for its own."""
+    rng, m = np.random.default_rng(3), 1000
+    by_lamp = rng.uniform(0, 0.1, (m, 1))
+    by_highlight = 10 * by_lamp**2
+    sent = 0.4 / np.pi * (1 + 20 * by_lamp + 30 * by_highlight) * np.ones(3)
+    measured = np.full((2, 3), 0.5)
+    unknown = Unknown(np.concatenate([by_lamp, by_highlight], 1), np.zeros((m, 0, 3)), measured, measured)
+    pairs, received = rng.integers(0, m, (8 * m, 2)), np.ones((m, 3))
+    both, _ = solve(sent, received, unknown, pairs)
+    assert both[1].mean() > 10
+    alone, _ = solve(sent, received + 0.5 * by_highlight, unknown.part(np.array([True, False])), pairs)
+    found, _ = solve_for_some(sent, received, unknown, pairs, lambda radiance: np.array([True, radiance[1, 0] < 2]))
+    assert (found[1] == 0.5).all() and found[0] == pytest.approx(alone[0])
+    all_of_them, _ = solve_for_some(sent, received, unknown, pairs, lambda radiance: np.ones(2, bool))
+    assert all_of_them == pytest.approx(both)

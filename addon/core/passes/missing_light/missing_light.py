@@ -13,7 +13,7 @@ from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
 from ...light.few_elements import filled_radiance, from_sun, irradiance_at, spread_over
 from ...light.field import LightField
-from ...light.joint_fit import Unknown, in_one_plane, solve
+from ...light.joint_fit import Unknown, in_one_plane, solve_for_some
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
 from ...light.params import GATHER
@@ -128,18 +128,30 @@ def find_missing_light(
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
-    radiances, spread = solve(sent, received, unknown, pairs)
+    in_sun = np.array([_mostly_lit(field, mask) for mask in masks.values()], bool)
 
+    def shining(radiances: np.ndarray) -> np.ndarray:
+        """Patches that are lamps, (p,) bool: brighter than measured, and all of one a tenth of the light somewhere."""
+        of_lamp = radiances[: len(patch_bounds)]
+        E = received + unknown.irradiance(radiances)
+        shares = by_white[:, : len(of_lamp)] * (of_lamp @ LUMINANCE) / (E @ LUMINANCE)[:, None]
+        strong = (shares > LEVELS.gain).sum(0) >= LEVELS.many
+        brighter = (lamp_of @ of_lamp > MISSING.lamp * bounds).all(1)
+        return (lamp_of[:, strong] > 0).any(1) & brighter & ~in_sun
+
+    def believed(radiances: np.ndarray) -> np.ndarray:
+        """A patch that is no lamp, a highlight or what lamps light, sends what frames show: it would fit anything."""
+        lamps = (lamp_of[shining(radiances)] > 0).any(0)
+        return np.concatenate([lamps, np.ones(len(radiances) - len(lamps), bool)])
+
+    radiances, spread = solve_for_some(sent, received, unknown, pairs, believed)
     patch_radiance = lamp_of @ radiances[: len(patch_bounds)]
     solved = dict(zip(patches, patch_radiance, strict=True))
     E = received + unknown.irradiance(radiances)
-    patch_shares = by_patch * (patch_radiance @ LUMINANCE) / (E @ LUMINANCE)[:, None]
-    in_sun = {patch for patch, mask in masks.items() if _mostly_lit(field, mask)}
-    strong = (patch_shares > LEVELS.gain).sum(0) >= LEVELS.many
     lamps = tuple(
         Lamp(patch, solved[patch].astype(np.float32), False, clipped=True, spread=spread)
-        for k, patch in enumerate(patches)
-        if strong[k] and (solved[patch] > MISSING.lamp * bound[patch]).all() and patch not in in_sun
+        for patch, lamp in zip(patches, shining(radiances), strict=True)
+        if lamp
     )
     opening_radiance = np.tile(daylight, (len(through.T), 1))
     opening_radiance[usable_cells] = radiances[len(lower_bounds) : sources]
