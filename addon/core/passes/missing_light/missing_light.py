@@ -130,27 +130,25 @@ def find_missing_light(
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
     in_sun = np.array([_mostly_lit(field, mask) for mask in masks.values()], bool)
 
-    def shining(radiances: np.ndarray) -> np.ndarray:
-        """Patches that are lamps, (p,) bool: brighter than measured, and all of one a tenth of the light somewhere."""
-        of_lamp = radiances[: len(patch_bounds)]
-        E = received + unknown.irradiance(radiances)
-        shares = by_white[:, : len(of_lamp)] * (of_lamp @ LUMINANCE) / (E @ LUMINANCE)[:, None]
-        strong = (shares > LEVELS.gain).sum(0) >= LEVELS.many
-        brighter = (lamp_of @ of_lamp > MISSING.lamp * bounds).all(1)
-        return (lamp_of[:, strong] > 0).any(1) & brighter & ~in_sun
+    def shines(of_lamp: np.ndarray) -> np.ndarray:
+        """The patches that send clearly more than was measured, and not as the sun lights them, (p,) bool."""
+        return (lamp_of @ of_lamp > MISSING.lamp * bounds).all(1) & ~in_sun
 
     def believed(radiances: np.ndarray) -> np.ndarray:
-        """A patch that is no lamp, a highlight or what lamps light, sends what frames show: it would fit anything."""
-        lamps = (lamp_of[shining(radiances)] > 0).any(0)
+        """Not a highlight, or what lamps light: a patch that hardly lights the room would fit anything."""
+        of_lamp = radiances[: len(patch_bounds)]
+        E = received + unknown.irradiance(radiances)
+        lamps = _prominent(by_white[:, : len(of_lamp)], of_lamp, E) & (lamp_of[shines(of_lamp)] > 0).any(0)
         return np.concatenate([lamps, np.ones(len(radiances) - len(lamps), bool)])
 
     radiances, spread = solve_for_some(sent, received, unknown, pairs, believed)
     patch_radiance = lamp_of @ radiances[: len(patch_bounds)]
     solved = dict(zip(patches, patch_radiance, strict=True))
     E = received + unknown.irradiance(radiances)
+    lamp_patches = _prominent(by_patch, patch_radiance, E) & shines(radiances[: len(patch_bounds)])
     lamps = tuple(
         Lamp(patch, solved[patch].astype(np.float32), False, clipped=True, spread=spread)
-        for patch, lamp in zip(patches, shining(radiances), strict=True)
+        for patch, lamp in zip(patches, lamp_patches, strict=True)
         if lamp
     )
     opening_radiance = np.tile(daylight, (len(through.T), 1))
@@ -168,6 +166,12 @@ def find_missing_light(
     notes = (note,) if share >= LEVELS.gain else ()
     sun = radiances[-1] if sunlit.any() else np.ones(3)
     return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, sun, spread, notes)
+
+
+def _prominent(contribution: np.ndarray, radiance: np.ndarray, irradiance: np.ndarray) -> np.ndarray:
+    """Which of k sources ((m, k), (k, 3)) give a tenth of all E ((m, 3)) at many of the m elements, (k,) bool."""
+    share = contribution * (radiance @ LUMINANCE) / (irradiance @ LUMINANCE)[:, None]
+    return (share > LEVELS.gain).sum(0) >= LEVELS.many
 
 
 def _by_sun(field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
