@@ -117,37 +117,31 @@ def grid(origin, across, up, columns=1, rows=1) -> tuple[np.ndarray, np.ndarray]
     return origin + uv[..., :1] * across + uv[..., 1:] * up, uv
 
 
-def box(low, high) -> tuple[np.ndarray, np.ndarray]:
-    """The six sides of a box, each with uv over its whole: top first, bottom last."""
+def box(low, high, steps=1) -> tuple[np.ndarray, np.ndarray]:
+    """The six sides of a box, each `steps` x `steps` quads with uv over its whole: top first, bottom last."""
     (x, y, z), (dx, dy, dz) = low, np.subtract(high, low)
-    sides = [
-        grid((x, y, z + dz), (dx, 0, 0), (0, dy, 0)),
-        grid((x, y, z), (dx, 0, 0), (0, 0, dz)),
-        grid((x + dx, y, z), (0, dy, 0), (0, 0, dz)),
-        grid((x + dx, y + dy, z), (-dx, 0, 0), (0, 0, dz)),
-        grid((x, y + dy, z), (0, -dy, 0), (0, 0, dz)),
-        grid((x, y + dy, z), (dx, 0, 0), (0, -dy, 0)),
-    ]
-    return np.concatenate([s[0] for s in sides]), np.concatenate([s[1] for s in sides])
+    sides = (
+        ((x, y, z + dz), (dx, 0, 0), (0, dy, 0)),
+        ((x, y, z), (dx, 0, 0), (0, 0, dz)),
+        ((x + dx, y, z), (0, dy, 0), (0, 0, dz)),
+        ((x + dx, y + dy, z), (-dx, 0, 0), (0, 0, dz)),
+        ((x, y + dy, z), (0, -dy, 0), (0, 0, dz)),
+        ((x, y + dy, z), (dx, 0, 0), (0, -dy, 0)),
+    )
+    return joined(grid(*side, steps, steps) for side in sides)
+
+
+def joined(shapes) -> tuple[np.ndarray, np.ndarray]:
+    """Several shapes as one: corners and uv of all their quads."""
+    quads, uv = zip(*shapes)
+    return np.concatenate(quads), np.concatenate(uv)
 
 
 def ball(centre, radius, steps) -> tuple[np.ndarray, np.ndarray]:
     """A sphere from the sides of a cube, each cut into `steps` x `steps` quads of like size."""
-    quads, uv = zip(
-        *(
-            grid(*side, steps, steps)
-            for side in (
-                ((-1, -1, 1), (2, 0, 0), (0, 2, 0)),
-                ((-1, -1, -1), (2, 0, 0), (0, 0, 2)),
-                ((1, -1, -1), (0, 2, 0), (0, 0, 2)),
-                ((1, 1, -1), (-2, 0, 0), (0, 0, 2)),
-                ((-1, 1, -1), (0, -2, 0), (0, 0, 2)),
-                ((-1, 1, -1), (2, 0, 0), (0, -2, 0)),
-            )
-        )
-    )
-    cube = np.tan(np.concatenate(quads) * np.pi / 4)
-    return np.asarray(centre) + radius * cube / np.linalg.norm(cube, axis=-1, keepdims=True), np.concatenate(uv)
+    quads, uv = box((-1, -1, -1), (1, 1, 1), steps)
+    cube = np.tan(quads * np.pi / 4)
+    return np.asarray(centre) + radius * cube / np.linalg.norm(cube, axis=-1, keepdims=True), uv
 
 
 def cone(centre, low_radius, high_radius, height, steps) -> tuple[np.ndarray, np.ndarray]:
@@ -205,10 +199,8 @@ def room() -> tuple[RoomObject, ...]:
     objects: list[RoomObject] = []
 
     def add(class_name, shapes, *paints, slots=None, triangles=False):
-        slots = slots or [0] * len(shapes)
-        quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
-        slot = np.repeat(slots, [len(s[0]) for s in shapes])
-        objects.append(RoomObject(len(objects), class_name, quads, uv, slot, paints, triangles))
+        slot = np.repeat(slots or [0] * len(shapes), [len(quads) for quads, _ in shapes])
+        objects.append(RoomObject(len(objects), class_name, *joined(shapes), slot, paints, triangles))
 
     def plain(*colour, **gloss):
         return Paint(np.array(colour, np.float32), **gloss)
@@ -227,9 +219,9 @@ def room() -> tuple[RoomObject, ...]:
         ],
         plain(0.70, 0.64, 0.54),
     )
-    objects[-1] = facing(objects[-1], np.array([x / 2, y / 2, z / 2]))
     add("papered wall", [grid((x, y, 0), (-x, 0, 0), (0, 0, z), 16, 10)], Paint(wallpaper()))
-    objects[-1] = facing(objects[-1], np.array([x / 2, y / 2, z / 2]))
+    for wall in objects[-2:]:
+        face(wall, np.array([x / 2, y / 2, z / 2]))
     add("ceiling lamp", [box((1.85, 1.45, z - 0.06), (2.55, 2.15, z - 0.01))], lamp(20.0, 18.5, 16.5))
     add(
         "sofa",
@@ -272,7 +264,7 @@ def room() -> tuple[RoomObject, ...]:
     books = np.random.default_rng(5)
     frame = [box((4.1, 0.3, h), (4.38, 1.5, h + 0.03)) for h in (0.02, 0.52, 1.02, 1.52)]
     frame += [box((4.1, a, 0.02), (4.38, a + 0.03, 1.55)) for a in (0.27, 1.5)]
-    shelves, at = [], 0.0
+    shelves = []
     for h in (0.05, 0.55, 1.05):
         at = 0.32
         while at < 1.40:
@@ -285,12 +277,11 @@ def room() -> tuple[RoomObject, ...]:
     return tuple(objects)
 
 
-def facing(obj: RoomObject, point: np.ndarray) -> RoomObject:
-    """The same object with every quad's front towards `point`."""
+def face(obj: RoomObject, point: np.ndarray) -> None:
+    """Turn the front of each of an object's quads towards `point`."""
     normal = np.cross(obj.quads[:, 1] - obj.quads[:, 0], obj.quads[:, 3] - obj.quads[:, 0])
     away = np.einsum("qk,qk->q", normal, point - obj.quads[:, 0]) < 0
     obj.quads[away], obj.uv[away] = obj.quads[away, ::-1], obj.uv[away, ::-1]
-    return obj
 
 
 def tour(frames: int) -> np.ndarray:
@@ -310,7 +301,7 @@ def look_at(eye, target) -> np.ndarray:
     right = np.cross((0, 0, 1), back)
     right /= np.linalg.norm(right)
     pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(back, right), back, eye
+    pose[:3] = np.column_stack([right, np.cross(back, right), back, eye])
     return pose
 
 
@@ -325,15 +316,7 @@ def frame_path(index: int) -> str:
 def write_all_but_frames(
     folder: Path, objects: tuple[RoomObject, ...], poses: np.ndarray, size: tuple[int, int]
 ) -> None:
-    """Make `folder` a capture without its pictures.
-
-    Parameters
-    ----------
-    poses : (n, 4, 4) float
-        Camera to world.
-    size : tuple of int
-        Width and height of the frames.
-    """
+    """Make `folder` a capture without its pictures; `poses` as of `tour`, `size` is the frames' width and height."""
     (folder / "images").mkdir(parents=True)
     (folder / "truth").mkdir()
     write_mesh(folder / "mesh.ply", objects)
@@ -342,16 +325,9 @@ def write_all_but_frames(
     (folder / "truth" / "materials.json").write_text(json.dumps([truth(obj) for obj in objects], indent=1))
     width, height = size
     focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
-    transforms = {
-        "camera_model": "PINHOLE",
-        "w": width,
-        "h": height,
-        "fl_x": focal,
-        "fl_y": focal,
-        "cx": width / 2,
-        "cy": height / 2,
-        "frames": [{"file_path": frame_path(k), "transform_matrix": pose.tolist()} for k, pose in enumerate(poses)],
-    }
+    frames = [{"file_path": frame_path(k), "transform_matrix": pose.tolist()} for k, pose in enumerate(poses)]
+    lens = {"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2, "cy": height / 2}
+    transforms = {"camera_model": "PINHOLE", **lens, "frames": frames}
     (folder / "transforms.json").write_text(json.dumps(transforms, indent=1))
 
 

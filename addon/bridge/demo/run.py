@@ -41,17 +41,8 @@ def run_demo(
 ) -> str:
     """Render the known room into OUT/capture, recover it into OUT, and compare.
 
-    Parameters
-    ----------
-    size : str
-        One of `demo.render.SIZES`.
-    listener, should_stop
-        See `Progress`.
-
-    Returns
-    -------
-    str
-        The table of recovered against true values; OUT/comparison.txt holds it too.
+    `size` is one of `demo.render.SIZES`; for `listener` and `should_stop` see `Progress`. Returns the table of
+    recovered against true values, which OUT/comparison.txt holds too.
     """
     out = Path(out)
     Store(out).close()  # a folder that can't be written is reported now, not after the rendering
