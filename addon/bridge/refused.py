@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -43,14 +43,10 @@ def whole_folder(folder: Path, what: str) -> Iterator[Path]:
 
 def sentences(*remarks: tuple[list[str], str]) -> tuple[str, ...]:
     """One sentence for each remark, naming all objects that it is about; remarks without objects are left out."""
-    return tuple(f"{_list_names(names)}: {what}." for names, what in remarks if names)
+    return tuple(f"Object{'s' if len(names) > 1 else ''} {listed(names)}: {what}." for names, what in remarks if names)
 
 
-def _list_names(names: list[str]) -> str:
-    """Names of objects for a sentence: the first ones, and how many more."""
-    listed = ", ".join(f"'{name}'" for name in names[:MAX_LISTED])
-    return (
-        f"Objects {listed} and {len(names) - MAX_LISTED} more"
-        if len(names) > MAX_LISTED
-        else f"Object{'s' if len(names) > 1 else ''} {listed}"
-    )
+def listed(names: Sequence[str]) -> str:
+    """Names for a sentence: the first ones, and how many more."""
+    omitted = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return ", ".join(f"'{name}'" for name in names[:MAX_LISTED]) + omitted

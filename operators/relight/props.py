@@ -7,7 +7,7 @@ import math
 
 import bpy
 
-from ...addon.bridge.light import lamps, outside, units
+from ...addon.bridge.light import lamps, outside, switch, units
 from ...addon.bridge.light.kelvin import HIGHEST, LOWEST
 from ...addon.bridge.relight import match_frame
 from ...addon.bridge.relight import setup as relight_setup
@@ -107,7 +107,7 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
     factor: bpy.props.FloatProperty(
         name="Strength x",
         description="Times the radiance that the scan found; 1 is the lamp as captured",
-        max=lamps.MAX_FACTOR,
+        max=switch.MAX_FACTOR,
         **_FACTOR,
         **_lamp_property(lamps.factor, lamps.set_factor, 1.0),
     )
@@ -151,7 +151,7 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
     factor: bpy.props.FloatProperty(
         name="Strength",
         description="Times the light from outside that was recovered, or the picture's",
-        max=outside.MAX_FACTOR,
+        max=switch.MAX_FACTOR,
         **_FACTOR,
         **_stored_property(outside.factor, outside.set_factor),
     )

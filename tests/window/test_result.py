@@ -55,7 +55,7 @@ bpy.context.view_layer.objects.active = None
 def test_rows_further_down_are_scrolled_to(window):
     story = Story(window)
     rows = window.ask(
-        "sorted((one.name for one in module('addon.bridge.results.file').rows(bpy.context.scene.objects)),"
+        "sorted((one.name for one in module('addon.bridge.results.file').rows_of_parts(bpy.context.scene.objects)),"
         "key=module('addon.core.naming').in_order)"
     )
     for row in (len(rows) - 1, 1, VISIBLE):

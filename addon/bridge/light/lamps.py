@@ -1,21 +1,15 @@
 """The lamps that were found in the scan: on or off, stronger or weaker, of another colour, and back again.
 
-A lamp is a material whose model gives light. Its state is kept with the material as custom properties, so that it is
-saved with the file and needs no registered add-on; the node tree always shows it.
+A lamp is a material whose model gives light; `switch.py` keeps its state.
 """
 
 import bpy
 
 from ...core.errors import BadInputError
-from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
-from ..data.materials import EMISSION_STRENGTH, brdf_of, emission, emission_socket, principled
+from ..data.materials import brdf_of, emission, emission_socket, principled
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
-
-_STRENGTH, _COLOUR = (f"scan_relight_recovered_{name}" for name in ("strength", "colour"))
-_OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
-
-MAX_FACTOR: Limit[float] = 1000.0
+from .switch import COLOUR, STRENGTH, factor, is_on, keep, restore, set_factor, set_on, strength_socket
 
 radiance = emission
 """Radiance that a lamp emits at present, linear Rec.709 in the frames' unit."""
@@ -59,30 +53,6 @@ def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
     return matches
 
 
-def is_on(material: bpy.types.Material) -> bool:
-    """Whether a lamp shines."""
-    return not material.get(_OFF, False)
-
-
-def set_on(material: bpy.types.Material, on: bool) -> None:
-    """Switch a lamp on or off; its factor and colour stay."""
-    _keep(material)
-    material[_OFF] = not on
-    _show(material)
-
-
-def factor(material: bpy.types.Material) -> float:
-    """What the recovered radiance is multiplied by."""
-    return float(material.get(_FACTOR, 1.0))
-
-
-def set_factor(material: bpy.types.Material, value: float) -> None:
-    """Multiply the recovered radiance by `value` (0...`MAX_FACTOR`)."""
-    _keep(material)
-    material[_FACTOR] = min(max(float(value), 0.0), MAX_FACTOR)
-    _show(material)
-
-
 def colour(material: bpy.types.Material) -> tuple[float, float, float] | None:
     """Colour of the light, linear Rec.709, its largest component 1 as recovered; None where a picture gives it."""
     socket = emission_socket(material)
@@ -91,7 +61,7 @@ def colour(material: bpy.types.Material) -> tuple[float, float, float] | None:
 
 def set_colour(material: bpy.types.Material, value: tuple[float, float, float]) -> None:
     """Give the light another colour at the same strength; without effect where a picture gives it."""
-    _keep(material)
+    keep(material)
     socket = emission_socket(material)
     if socket is not None:
         socket.default_value = (*(max(float(c), 0.0) for c in value), 1)
@@ -112,40 +82,25 @@ def set_kelvin(material: bpy.types.Material, value: float) -> None:
 
 def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:
     """Radiance that was recovered, linear Rec.709 in the frames' unit."""
-    node, socket = principled(material), emission_socket(material)
-    strength = material.get(_STRENGTH, node.inputs[EMISSION_STRENGTH].default_value)
-    tint = material.get(_COLOUR) or (socket.default_value[:3] if socket is not None else (1.0, 1.0, 1.0))
+    strength = material.get(STRENGTH, strength_socket(material).default_value)
+    tint = material.get(COLOUR) or colour(material) or (1.0, 1.0, 1.0)
     return tuple(float(strength) * float(c) for c in tint)
 
 
 def is_changed(material: bpy.types.Material) -> bool:
     """Whether a lamp differs from what was recovered."""
-    if _STRENGTH not in material:
-        return False
-    return not is_on(material) or factor(material) != 1 or is_coloured(material)
+    return STRENGTH in material and (not is_on(material) or factor(material) != 1 or is_coloured(material))
 
 
 def is_coloured(material: bpy.types.Material) -> bool:
     """Whether a lamp's colour is another one than was recovered."""
-    return _COLOUR in material and tuple(material[_COLOUR]) != colour(material)
-
-
-def restore(material: bpy.types.Material) -> None:
-    """Reset a lamp to what was recovered."""
-    if _STRENGTH not in material:
-        return
-    inputs, socket = principled(material).inputs, emission_socket(material)
-    inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH]
-    if socket is not None:
-        socket.default_value = (*material[_COLOUR], 1)
-    for name in (_STRENGTH, _COLOUR, _OFF, _FACTOR):
-        material.pop(name, None)
+    return COLOUR in material and tuple(material[COLOUR]) != colour(material)
 
 
 def snapshot(material: bpy.types.Material) -> dict:
     """The state of a lamp for `put_back`."""
-    state = {"on": is_on(material), "factor": factor(material), "colour": colour(material)}
-    return state | {"touched": _STRENGTH in material}
+    on, touched = is_on(material), STRENGTH in material
+    return {"on": on, "factor": factor(material), "colour": colour(material), "touched": touched}
 
 
 def put_back(material: bpy.types.Material, state: dict) -> None:
@@ -162,29 +117,13 @@ def put_back(material: bpy.types.Material, state: dict) -> None:
 def carry(old: bpy.types.Material, new: bpy.types.Material) -> None:
     """Give a lamp that was recovered anew the state of the lamp that it replaces."""
     state = snapshot(old)
-    if state["colour"] is not None and tuple(old.get(_COLOUR, state["colour"])) == state["colour"]:
+    if state["colour"] is not None and tuple(old.get(COLOUR, state["colour"])) == state["colour"]:
         state["colour"] = None  # as found: the new one's own
     put_back(new, state)
 
 
 def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
     """The inputs that show a lamp's state; none while it is as recovered."""
-    if _STRENGTH not in material or not is_lamp(material):
+    if STRENGTH not in material or not is_lamp(material):
         return []
-    inputs = principled(material).inputs
-    return [socket for socket in (inputs[EMISSION_STRENGTH], emission_socket(material)) if socket is not None]
-
-
-def _keep(material):
-    """Note what was recovered, before the first change."""
-    if _STRENGTH in material:
-        return
-    inputs, tint = principled(material).inputs, colour(material)
-    material[_STRENGTH] = inputs[EMISSION_STRENGTH].default_value
-    if tint is not None:
-        material[_COLOUR] = tint
-
-
-def _show(material):
-    inputs, on = principled(material).inputs, is_on(material)
-    inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
+    return [socket for socket in (strength_socket(material), emission_socket(material)) if socket is not None]

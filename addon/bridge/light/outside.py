@@ -1,6 +1,6 @@
 """The light from outside, which is the scene's world: on or off, strength, turned about the vertical, another picture.
 
-As with lamps, the state is kept with the world as custom properties and its node tree shows it.
+`switch.py` keeps its state, but for the turn, which a node has.
 """
 
 import math
@@ -11,20 +11,19 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import BadInputError
-from ...core.kinds import Limit
 from ...core.luminance import LUMINANCE
 from ...core.scene.sphere import fibonacci
 from ..data.images import RADIANCE, image_array
 from ..data.nodes import add_node, feed, find_node, make_world
 from .room import bounds, leaves, room_light
+from .switch import STRENGTH, factor, is_on, set_factor, set_on, strength_socket
+from .switch import restore as restore_strength
 
 RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
 HDRI = "scan_relight_hdri"
 """Custom property of a world of ours: the path of the picture that it shows."""
-_OFF, _FACTOR, _STRENGTH = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
 _TURN, _COORDINATES = "Scan Relight turn", "Scan Relight place"
-MAX_FACTOR: Limit[float] = 1000.0
 _OUTDOOR_FACTOR = 4.0
 """Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
 which shows through openings that cover a small part of what any spot of the room sees."""
@@ -34,30 +33,6 @@ def has_outside(scene: bpy.types.Scene) -> bool:
     """Whether the scene's world shows a picture or any colour but black."""
     node = find_node(scene.world, "BACKGROUND")
     return node is not None and bool(node.inputs["Color"].links or any(node.inputs["Color"].default_value[:3]))
-
-
-def is_on(world: bpy.types.World) -> bool:
-    """Whether light comes from outside."""
-    return not world.get(_OFF, False)
-
-
-def set_on(world: bpy.types.World, on: bool) -> None:
-    """Let light in from outside, or not."""
-    _keep(world)
-    world[_OFF] = not on
-    _show(world)
-
-
-def factor(world: bpy.types.World) -> float:
-    """What the recovered light from outside is multiplied by."""
-    return float(world.get(_FACTOR, 1.0))
-
-
-def set_factor(world: bpy.types.World, value: float) -> None:
-    """Multiply the light from outside by `value` (0...`MAX_FACTOR`)."""
-    _keep(world)
-    world[_FACTOR] = min(max(float(value), 0.0), MAX_FACTOR)
-    _show(world)
 
 
 def rotation(world: bpy.types.World) -> float:
@@ -128,14 +103,9 @@ def restore(scene: bpy.types.Scene) -> None:
     if scene.get(RECOVERED) is not None:
         scene.world = scene[RECOVERED]
     scene.pop(RECOVERED, None)
-    world = scene.world
-    if world is None:
-        return
-    set_rotation(world, 0.0)
-    if _STRENGTH in world:
-        find_node(world, "BACKGROUND").inputs["Strength"].default_value = world[_STRENGTH]
-    for name in (_STRENGTH, _OFF, _FACTOR):
-        world.pop(name, None)
+    if scene.world is not None:
+        set_rotation(scene.world, 0.0)
+        restore_strength(scene.world)
 
 
 def recovered_world(scene: bpy.types.Scene) -> bpy.types.World | None:
@@ -155,13 +125,13 @@ def is_changed(scene: bpy.types.Scene) -> bool:
 
 def strength(world: bpy.types.World | None) -> float:
     """What the world's picture or colour is multiplied by now; 0 without a world."""
-    node = find_node(world, "BACKGROUND")
-    return 0.0 if node is None else float(node.inputs["Strength"].default_value)
+    socket = strength_socket(world)
+    return 0.0 if socket is None else float(socket.default_value)
 
 
 def recovered_strength(world: bpy.types.World | None) -> float:
     """`strength` as it was recovered."""
-    return float(world.get(_STRENGTH, strength(world))) if world is not None else 0.0
+    return float(world.get(STRENGTH, strength(world))) if world is not None else 0.0
 
 
 def outdoor_radiance(scene: bpy.types.Scene) -> float:
@@ -201,7 +171,7 @@ def snapshot(world: bpy.types.World | None) -> dict:
     """The state of a world for `put_back`."""
     if world is None:
         return {}
-    return {"on": is_on(world), "factor": factor(world), "rotation": rotation(world), "touched": _STRENGTH in world}
+    return {"on": is_on(world), "factor": factor(world), "rotation": rotation(world), "touched": STRENGTH in world}
 
 
 def put_back(world: bpy.types.World | None, state: dict) -> None:
@@ -218,19 +188,7 @@ def state_sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
     """The inputs that show the state of the light from outside."""
     texture = find_node(world, "TEX_ENVIRONMENT")
     turned = [texture.inputs["Vector"]] if texture is not None and rotation(world) else []
-    return turned + ([find_node(world, "BACKGROUND").inputs["Strength"]] if _STRENGTH in world else [])
-
-
-def _keep(world):
-    node = find_node(world, "BACKGROUND")
-    if node is not None and _STRENGTH not in world:
-        world[_STRENGTH] = node.inputs["Strength"].default_value
-
-
-def _show(world):
-    node = find_node(world, "BACKGROUND")
-    if node is not None:
-        node.inputs["Strength"].default_value = world[_STRENGTH] * factor(world) * is_on(world)
+    return turned + ([strength_socket(world)] if STRENGTH in world else [])
 
 
 _ROWS, _COLUMNS = 8, 16

@@ -74,9 +74,8 @@ def window_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
         position, inward = center + direction * distance, -direction
         if hit and abs(hit.normal.z) < 0.5:
             inward = Vector((*hit.normal.xy, 0)).normalized()
-        score = _illumination(scene, subject, position, inward) * (
-            1.5 if hit is None or leaves(scene, center, direction) else 1.0
-        )
+        is_opening = hit is None or leaves(scene, center, direction)
+        score = _illumination(scene, subject, position, inward) * (1.5 if is_opening else 1.0)
         if score > best_score:
             best_score, opening = score, (position, inward)
     if opening is None:  # a room too narrow for any of it
@@ -98,9 +97,8 @@ def sun_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
         for up, side in product((14, 22, 30, 38), range(15, 346, 15)):
             direction = _rotated(-view_direction(scene), side, up)
             shares = subject.weights * (subject.normals @ np.array(direction))
-            visible_share = sum(
-                shares[k] for k in range(0, len(starts), 2) if shares[k] > 0 and leaves(scene, starts[k], direction)
-            )
+            lit = (k for k in range(0, len(starts), 2) if shares[k] > 0 and leaves(scene, starts[k], direction))
+            visible_share = sum(shares[k] for k in lit)
             if visible_share > best_share:
                 best_share, sun_direction = visible_share, direction
     if sun_direction is None:
@@ -142,11 +140,9 @@ def _candidates(scene, subject: Subject, preference: Preference) -> Iterator[tup
         direction = _rotated(camera, sign * (preference.side + turn), min(preference.up * up, 80))
         weight = direction.dot(_rotated(camera, sign * preference.side, preference.up))
         free_distance = _usable_distance(scene, subject.target, direction, preference.distance)
-        yield from (
-            (subject.target + direction * share * preference.distance, weight)
-            for share in (1.0, 0.7, 0.45)
-            if share * preference.distance <= free_distance
-        )
+        for share in (1.0, 0.7, 0.45):
+            if share * preference.distance <= free_distance:
+                yield subject.target + direction * share * preference.distance, weight
     if scene.camera is not None:
         eye, right = scene.camera.matrix_world.translation, _UP.cross(camera)
         for step in (right * across + 0.4 * abs(across) * _UP for across in (0.9, -0.9, 0.5, -0.5, 0.0)):
@@ -159,11 +155,8 @@ def _illumination(scene, subject: Subject, position: Vector, axis: Vector) -> fl
     directions = np.array(position) - subject.points
     distances = np.maximum(np.linalg.norm(directions, axis=1), 0.05)
     directions /= distances[:, None]
-    irradiance = (
-        np.maximum((directions * subject.normals).sum(1), 0)
-        * np.maximum(-directions @ np.array(axis), 0)
-        / distances**2
-    )
+    incidence = np.maximum((directions * subject.normals).sum(1), 0)
+    irradiance = incidence * np.maximum(-directions @ np.array(axis), 0) / distances**2
     for k in np.flatnonzero(irradiance > 0):
         if _free_distance(scene, position, -Vector(directions[k]), distances[k]) < distances[k] - 0.03:
             irradiance[k] = 0.0
@@ -208,12 +201,8 @@ def _usable_distance(scene, target: Vector, direction: Vector, limit: float) -> 
 
 def _exit_distance(position: Vector, direction: Vector, low: Vector, high: Vector) -> float:
     """Distance along a ray from inside a box to its side; 0 from outside."""
-    distances = [
-        ((high if direction[k] > 0 else low)[k] - position[k]) / direction[k]
-        for k in range(3)
-        if abs(direction[k]) > 1e-9
-    ]
-    return max(min(distances, default=0.0), 0.0)
+    sides = ((k, high if direction[k] > 0 else low) for k in range(3) if abs(direction[k]) > 1e-9)
+    return max(min(((side[k] - position[k]) / direction[k] for k, side in sides), default=0.0), 0.0)
 
 
 def _rotation_towards(direction: Vector) -> Quaternion:

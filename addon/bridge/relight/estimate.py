@@ -37,8 +37,7 @@ Source = Callable[[Vector], Iterator[tuple[Vector, float, float]]]
 class ViewCache:
     """Of one view: points with their normals, first the `visible_count` ones in the picture, then those all over the
     room, with the area in square metres that each represents; irradiance at the visible ones of each source at a
-    strength of 1.
-    """
+    strength of 1."""
 
     view: tuple
     points: list[tuple[Vector, Vector]]
@@ -53,10 +52,7 @@ _caches: dict[str, ViewCache] = {}
 def stops(scene: bpy.types.Scene) -> float | None:
     """How many stops the current light is brighter than the captured one, where the camera looks.
 
-    Returns
-    -------
-    float or None
-        `NO_LIGHT` where all is dark; None until `measure_in_steps` has been run for this view and these lights.
+    `NO_LIGHT` where all is dark; None until `measure_in_steps` has been run for this view and these lights.
     """
     if scene.camera is None or not is_known(scene):
         return None
@@ -94,10 +90,9 @@ def measure_in_steps(scene: bpy.types.Scene) -> Iterator[None]:
             for point, normal in cache.points:
                 direct.append(_irradiance(scene, source, point, normal))
                 yield
-            indirect = _mean_irradiance(scene, key, cache.areas, direct[cache.visible_count :])
-            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect * TYPICAL_ALBEDO / (
-                1 - TYPICAL_ALBEDO
-            )
+            mean = _mean_irradiance(scene, key, cache.areas, direct[cache.visible_count :])
+            indirect = mean * TYPICAL_ALBEDO / (1 - TYPICAL_ALBEDO)
+            irradiances[key] = np.array(direct[: cache.visible_count] or [0.0]) + indirect
     cache.irradiances = irradiances
     _caches[scene.name] = cache
 
@@ -129,11 +124,8 @@ def _sample_points(scene) -> tuple[list, int, np.ndarray]:
             if hit is not None and not _is_lamp(hit):
                 hits.append(hit)
                 areas.append(hit.distance**2 / max(-hit.normal.dot(direction), 0.2))
-    return (
-        [(hit.location + 1e-3 * hit.normal, hit.normal) for hit in hits],
-        visible_count,
-        np.array(areas) * 2 * math.pi / _ROOM_RAYS,
-    )
+    points = [(hit.location + 1e-3 * hit.normal, hit.normal) for hit in hits]
+    return points, visible_count, np.array(areas) * 2 * math.pi / _ROOM_RAYS
 
 
 def _is_lamp(hit) -> bool:
@@ -173,13 +165,11 @@ def _irradiance(scene, source: Source, point: Vector, normal: Vector) -> float:
     for direction, distance, strength in source(point):
         cosine = normal.dot(direction)
         if cosine > 0 and strength > 0:
-            at_infinity = distance == math.inf
-            if (
-                leaves(scene, point, direction)
-                if at_infinity
-                else cast(scene, point, direction, distance - _TOLERANCE) is None
-            ):
-                total += cosine * strength
+            if distance == math.inf:
+                is_visible = leaves(scene, point, direction)
+            else:
+                is_visible = cast(scene, point, direction, distance - _TOLERANCE) is None
+            total += cosine * strength * is_visible
     return total
 
 
@@ -194,10 +184,8 @@ def _mean_irradiance(scene, key: tuple, areas: np.ndarray, irradiances: list[flo
 
 def _lamp_source(scene, name: str) -> Source:
     """A recovered lamp of radiance 1, by sample points on it."""
-    lamp = bpy.data.materials[name]
-    owner = scene.objects[
-        next(object_name for object_name, lamps in relight_lamps.lamps_by_object(scene).items() if lamp in lamps)
-    ]
+    lamp, by_object = bpy.data.materials[name], relight_lamps.lamps_by_object(scene)
+    owner = scene.objects[next(object_name for object_name, lamps in by_object.items() if lamp in lamps)]
     data, slots = owner.data, [slot.material == lamp for slot in owner.material_slots]
     corners = vertices_of(data, owner.matrix_world)[triangles_of(data)]
     if not all(slots):  # of a part, its faces alone
@@ -208,9 +196,8 @@ def _lamp_source(scene, name: str) -> Source:
     total_area = areas.sum()
     if not total_area > 0:
         return lambda point: iter(())
-    chosen = np.searchsorted(np.cumsum(areas) / total_area, (np.arange(_LAMP_SAMPLES) + 0.5) / _LAMP_SAMPLES).clip(
-        max=len(areas) - 1
-    )
+    shares = (np.arange(_LAMP_SAMPLES) + 0.5) / _LAMP_SAMPLES
+    chosen = np.searchsorted(np.cumsum(areas) / total_area, shares).clip(max=len(areas) - 1)
     samples = [(Vector(corners[k].mean(0)), Vector(area_vectors[k] / areas[k])) for k in chosen]
     two_sided = not shines_to_the_front(lamp)
     sample_area = total_area / _LAMP_SAMPLES
@@ -218,12 +205,8 @@ def _lamp_source(scene, name: str) -> Source:
     def irradiance(point: Vector) -> Iterator[tuple[Vector, float, float]]:
         for sample, normal in samples:
             direction, distance = _direction_and_distance(point, sample)
-            cosine = -normal.dot(direction)
-            yield (
-                direction,
-                distance,
-                (abs(cosine) if two_sided else cosine) * sample_area / max(distance**2, sample_area),
-            )
+            cosine = abs(normal.dot(direction)) if two_sided else -normal.dot(direction)
+            yield direction, distance, cosine * sample_area / max(distance**2, sample_area)
 
     return irradiance
 
@@ -240,11 +223,8 @@ def _light_source(obj: bpy.types.Object) -> Source:
             half_spread, angle = data.spread / 2, math.acos(min(max(cosine, -1.0), 1.0))
             if cosine <= 0 or angle >= half_spread:
                 return 0.0
-            falloff = (
-                1.0
-                if half_spread > 1.56
-                else (math.tan(half_spread) - math.tan(angle)) / (math.tan(half_spread) - half_spread)
-            )
+            tangent = math.tan(half_spread)
+            falloff = 1.0 if half_spread > 1.56 else (tangent - math.tan(angle)) / (tangent - half_spread)
             return cosine * falloff / math.pi
         if data.type != "SPOT":
             return 1 / (4 * math.pi)

@@ -56,16 +56,13 @@ def add_light(
     ----------
     preset : str
         One of `PRESETS`.
-    strength : float
-        In `unit`.
-    aim : str
+    aim, obj
         See `light.room.target_of`.
-    obj : bpy.types.Object, optional
-        The target of `aim` = "OBJECT".
     kelvin : float, optional
         Temperature of its colour; by default the preset's in `KELVIN`.
     unit : str
-        Of `light.units`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable.
+        Of `strength`, see `light.units`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure
+        readable.
 
     Raises
     ------
@@ -127,9 +124,8 @@ def _lamp(
     else:
         data.shape, data.size, data.size_y = "RECTANGLE", placement.width, placement.height
         data.spread = _BEAM if preset == SUN else _SPREAD[preset]
-        data.energy = irradiance / (
-            1 / area if preset == SUN else _irradiance_per_watt(placement, distance, data.spread)
-        )
+        per_watt = 1 / area if preset == SUN else _irradiance_per_watt(placement, distance, data.spread)
+        data.energy = irradiance / per_watt
     return data
 
 

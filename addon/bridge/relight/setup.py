@@ -66,13 +66,11 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
         settings = json.loads(text)
         lights, outside = settings["lights"], settings["outside"]
         poses = [Matrix(entry["pose"]) for entry in lights]
-        states = {
-            name: (bool(entry[0]), float(entry[1]), [*entry, None][2])
-            for name, entry in dict(settings["lamps"]).items()
-        }
-        valid = all(math.isfinite(c) for pose in poses for row in pose for c in row) and all(
-            entry["kind"] in PRESETS and entry["type"] in ("AREA", "SPOT", "SUN", "POINT") for entry in lights
-        )
+        lamps = dict(settings["lamps"])
+        states = {name: (bool(entry[0]), float(entry[1]), [*entry, None][2]) for name, entry in lamps.items()}
+        kinds = {entry["kind"] for entry in lights} <= set(PRESETS)
+        valid = kinds and {entry["type"] for entry in lights} <= {"AREA", "SPOT", "SUN", "POINT"}
+        valid = valid and all(math.isfinite(c) for pose in poses for row in pose for c in row)
     except (ValueError, TypeError, KeyError, IndexError):
         valid = False
     if not valid:

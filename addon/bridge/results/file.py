@@ -4,6 +4,7 @@ An object's number alone is ambiguous: every room counts from 0, and a folder ma
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,8 @@ class Result:
 
     Attributes
     ----------
-    run : str
-        Key of the run; '' where it is older than such keys.
-    layout : str
-        Key of the layout of its images; '' likewise.
+    run, layout : str
+        Keys of the run and of the layout of its images; '' where it is older than such keys.
     objects : dict of int to dict
         Entries of materials.json by `object_id`.
     stages : dict of str to dict
@@ -57,19 +56,11 @@ def read(folder: Path) -> Result | None:
         if len(_cache) > 8:
             _cache.clear()
         report, materials = json_if_sound(folder / REPORT), json_if_sound(folder / MATERIALS)
-        entries = [
-            entry
-            for entry in _value_of_type(materials, "objects", list)
-            if isinstance(entry, dict) and "object_id" in entry
-        ]
-        result = Result(
-            folder,
-            _value_of_type(materials, "run", str),
-            _value_of_type(materials, "layout", str),
-            {entry["object_id"]: renamed(entry) for entry in entries},
-            _value_of_type(report, "stages", dict),
-        )
-        _cache[folder] = stamp, result
+        run, layout = (_value_of_type(materials, key, str) for key in ("run", "layout"))
+        entries = _value_of_type(materials, "objects", list)
+        sound = (entry for entry in entries if isinstance(entry, dict) and "object_id" in entry)
+        objects = {entry["object_id"]: renamed(entry) for entry in sound}
+        _cache[folder] = stamp, Result(folder, run, layout, objects, _value_of_type(report, "stages", dict))
     return _cache[folder][1]
 
 
@@ -91,7 +82,7 @@ def result_states(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object,
             continue
         folder_name, run = obj.get(RESULT), obj.get(RUN)
         if not folder_name:
-            if any(slot.material is not None and MODEL in slot.material for slot in obj.material_slots):
+            if any(slot.material and MODEL in slot.material for slot in obj.material_slots):
                 states[obj] = UNKNOWN, None
             continue
         if folder_name not in folders:
@@ -112,14 +103,8 @@ def result_state(obj: bpy.types.Object | None) -> tuple[str, Result | None]:
     return result_states([obj]).get(obj, ("", None)) if obj is not None else ("", None)
 
 
-def rows(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str, Any]]:
-    """The entry of materials.json of each object whose run is the one in its folder: of its main part."""
-    found = {obj: parts.get(obj[OBJECT_ID]) for obj, parts in rows_of_parts(objects).items()}
-    return {obj: entry for obj, entry in found.items() if entry is not None}
-
-
 def rows_of_parts(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[int, dict[str, Any]]]:
-    """The entries of each object's instances, by `object_id`, where its run is the one in its folder."""
+    """The entries in materials.json of each object's instances, where its run is the one in its folder."""
     found = {
         obj: {i: result.objects[i] for i in slots_of(obj) if i in result.objects}
         for obj, (state, result) in result_states(objects).items()
@@ -129,8 +114,7 @@ def rows_of_parts(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object,
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
+    with suppress(OSError):
         stat = path.stat()
-    except OSError:
-        return None
-    return stat.st_mtime_ns, stat.st_size
+        return stat.st_mtime_ns, stat.st_size
+    return None

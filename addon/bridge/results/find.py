@@ -18,12 +18,11 @@ from ...core.results.result_folders import FOLDER_BESIDE
 from ...core.results.room_file import MATERIALS, layout_of, run_of
 from ..custom_properties import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from ..data.images import relative_to, result_of
+from ..refused import listed
 from . import file
 from .default_folders import display_path
 from .images import KEPT, is_there, kept_path, path_of, result_images
 
-MAX_NAMED: Shown[int] = 3
-"""Images that a sentence names; the others are counted."""
 MAX_SUBFOLDERS: Limit[int] = 200
 """Sub-folders of a chosen folder that are searched."""
 CACHE_SECONDS: Shown[float] = 2.0
@@ -56,16 +55,10 @@ class Missing:
         """The message for the artist."""
         path = display_path(self.folder)
         if self.gone:
-            consequence = (
-                "its pictures can't be shown" if self.images else "what was found of each object can't be listed"
-            )
-            return f"The result folder '{path}' is gone: {consequence}."
-        names, count = ", ".join(f"'{name}'" for name in self.images[:MAX_NAMED]), len(self.images)
-        omitted = f" and {count - MAX_NAMED} more" if count > MAX_NAMED else ""
-        return (
-            f"{names}{omitted} {'are' if count > 1 else 'is'} missing in '{path}' and can't be shown; find the "
-            "result or run again."
-        )
+            lost = "its pictures can't be shown" if self.images else "what was found of each object can't be listed"
+            return f"The result folder '{path}' is gone: {lost}."
+        verb = "are" if len(self.images) > 1 else "is"
+        return f"{listed(self.images)} {verb} missing in '{path}' and can't be shown; find the result or run again."
 
 
 _cache: tuple[float, list[Missing], list[Path]] = -CACHE_SECONDS, [], []
@@ -131,14 +124,8 @@ def missing() -> list[Missing]:
         gone = not (folder / MATERIALS).is_file()
         if gone or folder in lost_images:
             known_runs = runs.get(folder, set()) - {""}
-            results.append(
-                Missing(
-                    folder,
-                    known_runs.pop() if len(known_runs) == 1 else "",
-                    tuple(sorted(lost_images.get(folder, ()))),
-                    gone,
-                )
-            )
+            run = known_runs.pop() if len(known_runs) == 1 else ""
+            results.append(Missing(folder, run, tuple(sorted(lost_images.get(folder, ()))), gone))
     return results
 
 
@@ -153,10 +140,10 @@ def search(results_root: Path) -> list[str]:
         if not lost.gone:
             count = repoint(lost.folder, lost.folder)
             if count:
+                verb = "are" if count > 1 else "is"
                 messages.append(
-                    f"{count} picture{'s' * (count > 1)} {'are' if count > 1 else 'is'} shown from "
-                    f"'{display_path(lost.folder)}', as the file's own {'are' if count > 1 else 'is'} gone; save the "
-                    "file to keep it so."
+                    f"{count} picture{'s' * (count > 1)} {verb} shown from '{display_path(lost.folder)}', as the "
+                    f"file's own {verb} gone; save the file to keep it so."
                 )
             continue
         file_folders = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
@@ -187,9 +174,8 @@ def find(lost: Missing, chosen: Path) -> Path:
         raise BadInputError(f"'{chosen}' can't be opened ({error.strerror or error}); choose a folder.") from error
     results = [place for place in (chosen, *subfolders, chosen.parent) if (place / MATERIALS).is_file()]
     for place in results:
-        if ((run_of(place) == lost.run) if lost.run else _may_be_result(place, lost.folder)) or _keeps_images(
-            place, lost
-        ):
+        fits = run_of(place) == lost.run if lost.run else _may_be_result(place, lost.folder)
+        if fits or _keeps_images(place, lost):
             return place
     if not results:
         raise BadInputError(
@@ -204,12 +190,7 @@ def find(lost: Missing, chosen: Path) -> Path:
 def repoint(old: Path, new: Path) -> int:
     """Redirect images, objects and rooms of the open file from a result folder to its new location.
 
-    Images that have another source (packed, or beside the file) stay as they are.
-
-    Returns
-    -------
-    int
-        How many images now refer to `new`.
+    Images that have another source (packed, or beside the file) stay as they are. Returns how many now refer to `new`.
     """
     count = 0
     for image in result_images():

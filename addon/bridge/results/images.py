@@ -210,9 +210,8 @@ def _copy_beside_file(source: Path) -> Path:
     used = set()
     for image in bpy.data.images:
         folder = Path(image[IMAGE]).parent if image.get(IMAGE) else source.parent
-        if not folder.is_relative_to(source.parent) and not source.is_relative_to(
-            folder
-        ):  # those of objects are deeper
+        # Those of objects are deeper.
+        if not folder.is_relative_to(source.parent) and not source.is_relative_to(folder):
             used.add(path_of(image).parent)
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
     target = next(path for path in (saved.parent / name / layout for name in names) if path not in used) / source.name

@@ -136,8 +136,8 @@ def test_a_result_of_version_0_1_shows_the_same(scene, results, tmp_path):
 
 def listed(scene, results):
     """What the list shows: alpha by the object's name."""
-    result_file = results.file
-    return {thing.name: one.get("alpha") for thing, one in result_file.rows(scene.objects).items()}
+    rows = results.file.rows_of_parts(scene.objects)
+    return {thing.name: parts[thing["object_id"]].get("alpha") for thing, parts in rows.items()}
 
 
 def test_two_rooms_each_show_their_own_values(scene, results, tmp_path):
