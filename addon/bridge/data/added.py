@@ -25,15 +25,13 @@ class AddedData:
     def remove(self) -> None:
         """Remove all of them, except images that older data shows."""
         for kind in KINDS:
-            removable = [
-                datablock
-                for datablock in self.new(kind)
-                if kind != "images" or datablock.users == datablock.use_fake_user
-            ]
+            removable = self.new(kind)
+            if kind == "images":
+                removable = [image for image in removable if image.users == image.use_fake_user]
             if removable:
                 bpy.data.batch_remove(removable)
 
-    def remove_unused(self, also: Iterable[int] = ()) -> None:
+    def remove_unused(self, also: Iterable[int]) -> None:
         """Remove unused datablocks: of the new ones, and of those whose `session_uid` is in `also`."""
         also = set(also)
         for kind in KINDS[1:]:

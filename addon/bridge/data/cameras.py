@@ -35,12 +35,7 @@ _GRID = 33
 
 
 def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, first: int = 0) -> list[bpy.types.Object]:
-    """Make a camera object for each frame and link it to a collection.
-
-    Parameters
-    ----------
-    first : int
-        Place of the first of `frames` in the capture's order.
+    """Make a camera object for each frame and link it to a collection; `first` is the first one's `FRAME_INDEX`.
 
     Returns
     -------
@@ -88,14 +83,8 @@ def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
 
 def show_camera(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Show one camera of a room whose others are hidden: Blender draws no picture behind a hidden one."""
-    room = next(
-        (
-            collection
-            for collection in scene.collection.children_recursive
-            if CAPTURE in collection and camera in set(collection.all_objects)
-        ),
-        None,
-    )
+    rooms = (collection for collection in scene.collection.children_recursive if CAPTURE in collection)
+    room = next((collection for collection in rooms if camera in set(collection.all_objects)), None)
     if room is None or camera.name in room.objects:
         return
     for obj in [obj for obj in room.objects if FRAME_INDEX in obj and len(obj.users_collection) > 1]:
@@ -151,9 +140,8 @@ def lens_warning(frames: Iterable[Frame]) -> str:
     """One sentence if Blender's cameras can't have some of the frames' lenses ('' if they can): the error in pixels."""
     cameras = [frame.camera for frame in frames if frame.camera.lens is not None]
     distinct = {(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens): c for c in cameras}
-    error, camera = max(
-        ((max_pixel_error(c), c) for c in distinct.values()), key=lambda pair: pair[0], default=(0.0, None)
-    )
+    errors = [(max_pixel_error(camera), camera) for camera in distinct.values()]
+    error, camera = max(errors, key=lambda pair: pair[0], default=(0.0, None))
     if error < _REPORTED_ERROR:
         return ""
     return (
@@ -164,13 +152,12 @@ def lens_warning(frames: Iterable[Frame]) -> str:
 
 def max_pixel_error(camera: Camera) -> float:
     """Largest distance in pixels between the Blender camera's picture and the camera's own."""
+    if isinstance(camera.lens, Equirectangular):
+        return 0.0
     y, x = (np.linspace(0, extent, _GRID) for extent in (camera.height, camera.width))
     pixels = np.stack([i.ravel() for i in np.meshgrid(x, y)], -1)
     points = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    inside = camera.lens.unproject(points)[1]
-    points = points[inside]
-    if isinstance(camera.lens, Equirectangular):
-        return 0.0
+    points = points[camera.lens.unproject(points)[1]]
     if _is_wide(camera):
         radius = np.hypot(points[:, 0], points[:, 1])
         theta = sum(k * (camera.fx * _SENSOR / camera.width * radius) ** power

@@ -28,18 +28,13 @@ def load_image(
     Parameters
     ----------
     path : Path or str
-        One with ``<UDIM>`` in its name stands for all its tiles.
+        One with ``<UDIM>`` in its name stands for all its tiles. The image's path is absolute (see `relative_to`).
     name : str, optional
         Name of the image in Blender; the file's stem if left out.
     colour_space : str
         `RADIANCE` or `DATA`.
     keep : bool
         Give it a fake user, so that it is saved although no material shows it.
-
-    Returns
-    -------
-    bpy.types.Image
-        Its path is absolute; `relative_to` changes that.
 
     Raises
     ------

@@ -40,9 +40,8 @@ def import_mesh(path: Path) -> RawMesh:
         ):
             copy = _import(path, Path(folder), scene)
             scene.view_layers[0].update()  # world matrices
-            parts = _parts(
-                added.new("objects"), copy.placed
-            )  # not all_objects: making that list takes its length squared
+            # Not all_objects: making that list takes its length squared.
+            parts = _parts(added.new("objects"), copy.placed)
     except OSError as error:
         reason = error.strerror or error
         raise BadInputError(
@@ -61,10 +60,9 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> Copy:
         try:
             if path.suffix.lower() == ".obj":
                 copy = copy_obj(path, folder)
-                split = {"use_split_objects": copy.named, "use_split_groups": not copy.named}
-                bpy.ops.wm.obj_import(
-                    filepath=str(copy.path), forward_axis="Y", up_axis="Z", validate_meshes=True, **split
-                )
+                settings = {"forward_axis": "Y", "up_axis": "Z", "validate_meshes": True}
+                settings |= {"use_split_objects": copy.named, "use_split_groups": not copy.named}
+                bpy.ops.wm.obj_import(filepath=str(copy.path), **settings)
                 return copy
             copy = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off

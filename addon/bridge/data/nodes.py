@@ -35,10 +35,8 @@ def mix_node(tree: bpy.types.NodeTree, factor, first, second, **settings) -> bpy
     """The output of a node that mixes two colours, where `factor` is 0 and 1; each as for `add_node`."""
     mix = add_node(tree, "ShaderNodeMix", data_type="RGBA", **settings)
     # By type, as the node has sockets of the same name for each of its data types.
-    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    for socket, value in zip(
-        (next(item for item in mix.inputs if item.type == "VALUE"), *colours), (factor, first, second)
-    ):
+    feed(next(socket for socket in mix.inputs if socket.type == "VALUE"), factor)
+    for socket, value in zip((socket for socket in mix.inputs if socket.type == "RGBA"), (first, second)):
         feed(socket, value)
     return next(socket for socket in mix.outputs if socket.type == "RGBA")
 

@@ -18,7 +18,9 @@ from .added import scene_apart
 from .arrays import layer_of, make_mesh, set_layer
 from .shown import in_window
 
-_PROJECTION_ANGLE = 1.15
+_PROJECTION = dict(angle_limit=1.15, island_margin=0.0, area_weight=0.0, correct_aspect=False, scale_to_bounds=False)
+_PACKING = dict(rotate=True, scale=True, margin_method="ADD", shape_method="AABB", udim_source="CLOSEST_UDIM")
+"""Settings of Blender's two operators."""
 _EXPECTED_FILL = 0.6
 _LAYER = "ScanRelight"
 
@@ -120,18 +122,7 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
 
 def _projected(points, vertex, start):
     """Coordinates of each corner, (c, 2) float32, by Blender's projection of each face along one of few directions."""
-    return _laid_out(
-        points,
-        vertex,
-        start,
-        np.zeros((len(vertex), 2)),
-        bpy.ops.uv.smart_project,
-        angle_limit=_PROJECTION_ANGLE,
-        island_margin=0.0,
-        area_weight=0.0,
-        correct_aspect=False,
-        scale_to_bounds=False,
-    )
+    return _laid_out(points, vertex, start, np.zeros((len(vertex), 2)), bpy.ops.uv.smart_project, **_PROJECTION)
 
 
 def _faces(face, pairs):
@@ -148,28 +139,16 @@ def _packed(points, corners, uv, size, margin_texels):
     Boxes are packed, not outlines: now that sparse islands are cut, outlines fill no more and can take minutes.
     """
     uv = (uv * np.sqrt(_EXPECTED_FILL / max(areas(uv).sum(), 1e-12))).astype(np.float32)
+    start = 3 * np.arange(len(corners))
 
     def placed(turn, margin):
-        return _laid_out(
-            points,
-            corners.ravel(),
-            3 * np.arange(len(corners)),
-            uv,
-            bpy.ops.uv.pack_islands,
-            rotate=True,
-            rotate_method=turn,
-            scale=True,
-            margin=margin,
-            margin_method="ADD",
-            shape_method="AABB",
-            udim_source="CLOSEST_UDIM",
-        ).reshape(-1, 3, 2)
+        settings = {"rotate_method": turn, "margin": margin, **_PACKING}
+        return _laid_out(points, corners.ravel(), start, uv, bpy.ops.uv.pack_islands, **settings).reshape(-1, 3, 2)
 
     # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
     target = margin = margin_texels / 2 / size
-    packed, turn = max(
-        ((placed(turn, margin), turn) for turn in ("ANY", "CARDINAL")), key=lambda candidate: areas(candidate[0]).sum()
-    )
+    candidates = ((placed(turn, margin), turn) for turn in ("ANY", "CARDINAL"))
+    packed, turn = max(candidates, key=lambda candidate: areas(candidate[0]).sum())
     for _ in range(2):
         border = packed.min()
         if border >= 0.97 * target or border <= 0:

@@ -41,15 +41,13 @@ class View:
     properties: dict[str, float]
 
 
-def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float = 1.0) -> tuple[float, ...]:
-    """Focal lengths and principal point (fx, fy, cx, cy) in pixels of a picture.
+def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float) -> tuple[float, ...]:
+    """Focal lengths and principal point (fx, fy, cx, cy) in pixels of a picture of `width` x `height`.
 
     Parameters
     ----------
     data : bpy.types.Camera
         A perspective camera.
-    width, height : float
-        Of the picture, in pixels.
     aspect : float
         Height of a pixel over its width.
 
@@ -84,10 +82,8 @@ def camera_of(
     ----------
     obj : bpy.types.Object
         A camera, evaluated where it is animated.
-    size : tuple of int
-        Width and height of the picture.
-    dimensions : tuple of float
-        See `frame_size`.
+    size, dimensions
+        Width and height of the picture in pixels; see `frame_size`.
     method : str
         How the background fills the camera's frame: 'STRETCH', 'FIT' or 'CROP'.
 
@@ -115,15 +111,8 @@ def camera_of(
         raise BadInputError(f"Camera '{obj.name}' is sheared or has no size; apply its scale.")
     if np.linalg.det(matrix[:3, :3]) < 0:
         raise BadInputError(f"Camera '{obj.name}' is mirrored; apply its scale.")
-    return Camera(
-        *size,
-        fx / scale_x,
-        fy / scale_y,
-        size[0] / 2 + (cx - width / 2) / scale_x,
-        size[1] / 2 + (cy - height / 2) / scale_y,
-        matrix,
-        lens,
-    )
+    cx, cy = size[0] / 2 + (cx - width / 2) / scale_x, size[1] / 2 + (cy - height / 2) / scale_y
+    return Camera(*size, fx / scale_x, fy / scale_y, cx, cy, matrix, lens)
 
 
 def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Object] = ()) -> list[bpy.types.Object]:
@@ -173,9 +162,8 @@ def views(
     frames: Iterable[int | None] = (None,)
     if mode == ANIMATION:
         cameras = [scene.camera] if scene.camera in cameras else cameras[:1]
-        frames = range(
-            scene.frame_start if first is None else first, (scene.frame_end if last is None else last) + 1, max(step, 1)
-        )
+        start, end = scene.frame_start if first is None else first, scene.frame_end if last is None else last
+        frames = range(start, end + 1, max(step, 1))
     used_names: set[str] = set()
     for frame in frames:
         if frame is not None:
@@ -213,7 +201,7 @@ def picture(background_image: bpy.types.CameraBackgroundImage, frame: int, owner
     """
     clip = background_image.source == "MOVIE_CLIP"
     source = background_image.clip if clip else background_image.image
-    path, problem = Path(bpy.path.abspath(source.filepath, library=source.library)), ""
+    path = Path(bpy.path.abspath(source.filepath, library=source.library))
     if source.source == "SEQUENCE":
         if clip:
             first = _DIGITS.search(path.stem)
@@ -228,22 +216,22 @@ def picture(background_image: bpy.types.CameraBackgroundImage, frame: int, owner
             frame += user.frame_offset
         path = path.with_stem(_DIGITS.sub(lambda digits: f"{frame:0{len(digits[1])}d}", path.stem, count=1))
     elif source.source == "FILE" and source.packed_file and not path.is_file():
-        problem = (
+        raise BadInputError(
             f"The picture behind camera '{owner}' is packed into the file; unpack it (File, External Data) so that it "
             "can be read."
         )
     elif source.source == "MOVIE":
-        problem = (
+        raise BadInputError(
             f"Camera '{owner}' has the film '{path.name}' behind it; materials need linear radiance: "
             "give a sequence of EXR pictures."
         )
-    if not problem and path.suffix.lower() != ".exr":
-        problem = (
+    if path.suffix.lower() != ".exr":
+        raise BadInputError(
             f"Camera '{owner}' has the picture '{path.name or source.name}' behind it, which is no EXR; materials need "
             "linear radiance."
         )
-    if not problem and not path.is_file():
-        problem = f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External Data)."
-    if problem:
-        raise BadInputError(problem)
+    if not path.is_file():
+        raise BadInputError(
+            f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External Data)."
+        )
     return path

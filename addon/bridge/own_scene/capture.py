@@ -36,16 +36,12 @@ class Source:
 
     Attributes
     ----------
-    name : str
-        As displayed to the artist.
+    name, whole : str
+        Its name and the whole object's, as displayed to the artist.
     thing : str
         Name of the object that shows it, at the time of capture.
-    whole : str
-        Displayed name of the whole object.
-    own : bool
-        Its faces are those of the object's mesh.
-    topology : str
-        See `own_scene.mesh.SceneObject.topology`; of the whole object.
+    own, topology
+        See `own_scene.mesh.SceneObject`; of the whole object.
     corner_start : int
         First of the object's corners in `faces.npz`.
     slot, face_set, part_of : int or None
@@ -81,7 +77,7 @@ def capture_scene(
         Replaced as a whole where it holds an earlier capture of a scene.
     objects : iterable of bpy.types.Object
         Their surfaces become the mesh; where there are cameras among them, only those are used.
-    how, first, last, step
+    mode, first, last, step
         See `own_scene.cameras.views`.
 
     Returns
@@ -118,9 +114,8 @@ def capture_scene(
     problems: list[str] = []
     current_frame = scene.frame_current, scene.frame_subframe
     try:
-        views = list(
-            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, problems, mode, first, last, step)
-        )
+        depsgraph = context.evaluated_depsgraph_get()
+        views = list(scene_cameras.views(scene, depsgraph, cameras, problems, mode, first, last, step))
     finally:
         if (scene.frame_current, scene.frame_subframe) != current_frame:
             scene.frame_set(current_frame[0], subframe=current_frame[1])
@@ -131,9 +126,9 @@ def capture_scene(
     metre = scene.unit_settings.scale_length if scene.unit_settings.system != "NONE" else 1.0
     with whole_folder(folder, f"The scene can't be captured into '{folder}'") as part:
         _write(part, mesh, scene_objects, views, metre)
-    return (
-        (f"{len(problems)} of {len(problems) + len(views)} pictures are left out: {message}",) if problems else ()
-    ) + _write_back_warnings(scene_objects)
+    count = len(problems) + len(views)
+    left_out = (f"{len(problems)} of {count} pictures are left out: {message}",) if problems else ()
+    return left_out + _write_back_warnings(scene_objects)
 
 
 def _write_back_warnings(scene_objects: list[SceneObject]) -> tuple[str, ...]:
@@ -153,23 +148,12 @@ def _write(
     (folder / "mesh.ply").write_bytes(ply_bytes(mesh.vertices * unit_scale, [(mesh.triangles, mesh.object_id)]))
     names, entries = [], []
     for scene_object in scene_objects:
+        owner = scene_object.obj.name, scene_object.own, scene_object.topology
         for segment in scene_object.segments:
             part_of = {} if segment.part_of is None else {"part_of": segment.part_of}
             names.append({"id": segment.object_id, "class_name": segment.class_name, "name": segment.name} | part_of)
-            entries.append(
-                Source(
-                    segment.object_id,
-                    segment.name,
-                    scene_object.obj.name,
-                    scene_object.own,
-                    scene_object.topology,
-                    mesh.corner_start[segment.object_id],
-                    segment.slot,
-                    segment.face_set,
-                    segment.part_of,
-                    scene_object.name,
-                )
-            )
+            start, part = mesh.corner_start[segment.object_id], (segment.slot, segment.face_set, segment.part_of)
+            entries.append(asdict(Source(segment.object_id, segment.name, *owner, start, *part, scene_object.name)))
     _write_json(folder / "info_semantic.json", {"objects": names})
     (folder / "images").mkdir()
     frames = []
@@ -185,7 +169,7 @@ def _write(
     _write_json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     with (folder / FACES).open("wb") as file:
         np.savez(file, **mesh.polygons._asdict())
-    _write_json(folder / OBJECTS, {"objects": [asdict(source) for source in entries]})
+    _write_json(folder / OBJECTS, {"objects": entries})
 
 
 def _write_json(path: Path, value) -> None:
@@ -225,9 +209,7 @@ def polygons_of(folder: Path | str, mesh: Mesh) -> Polygons | None:
             polygons = Polygons(*(stored[name] for name in Polygons._fields))
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         return None
-    matches = (
-        len(polygons.corner) == len(mesh.triangles)
-        and polygons.corner.max(initial=-1) < len(polygons.vertex)
-        and np.array_equal(polygons.vertex[polygons.corner], mesh.triangles)
+    matches = polygons.corner.max(initial=-1) < len(polygons.vertex) and np.array_equal(
+        polygons.vertex[polygons.corner], mesh.triangles
     )
     return polygons if matches else None

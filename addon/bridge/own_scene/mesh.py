@@ -113,12 +113,8 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
             name = f"{original.name}/{instance.object.name}" if instanced else original.name
             scene_object = by_key[key] = SceneObject(name, original)
         data = instance.object.data
-        scene_object.own &= (
-            not instance.is_instance
-            and not scene_object.pieces
-            and original.type == "MESH"
-            and same_topology(data, original.data)
-        )
+        is_plain = not instance.is_instance and not scene_object.pieces and original.type == "MESH"
+        scene_object.own &= is_plain and same_topology(data, original.data)
         vertices, loops = vertices_of(data, instance.matrix_world), triangles_of(data, "loops")
         if not np.isfinite(vertices).all():
             raise BadInputError(f"Object '{original.name}' has vertices that are not finite; mend its mesh first.")
@@ -129,12 +125,10 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
     kinds: dict[bpy.types.ID, str] = {}
     first_id = 0
     for scene_object in scene_objects:
-        class_name = (
-            kinds.setdefault(scene_object.obj.data, scene_object.name) if scene_object.own else scene_object.name
-        )
-        scene_object.segments, scene_object.segment_of = segments_of(
-            scene_object.pieces, scene_object.obj, scene_object.own, scene_object.name, class_name, first_id
-        )
+        pieces, obj, own, name = scene_object.pieces, scene_object.obj, scene_object.own, scene_object.name
+        class_name = kinds.setdefault(obj.data, name) if own else name
+        segments = segments_of(pieces, obj, own, name, class_name, first_id)
+        scene_object.segments, scene_object.segment_of = segments
         first_id += len(scene_object.segments)
     return scene_objects
 

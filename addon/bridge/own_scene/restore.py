@@ -24,16 +24,8 @@ PREVIOUS_SLOT = "scan_relight_slot_before"
 def restore(objects: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
     """Give objects their original materials back, as before the first `own_scene.write_back`.
 
-    Parameters
-    ----------
-    objects : iterable of bpy.types.Object
-        Those without recovered materials are skipped; a copy stands for the object that it was made of.
-
-    Returns
-    -------
-    count : int
-        Objects that were restored.
-    warnings : tuple of str
+    Those without recovered materials are skipped; a copy stands for the object that it was made of. Returns how many
+    were restored, and warnings.
     """
     originals = {(obj.get(COPY_OF) or obj): None for obj in objects}
     count, edited, changed_slots = 0, [], []
@@ -76,12 +68,10 @@ def restore(objects: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
                 del obj[key]
         remove_unused_materials(current_materials)
     images.drop_unused({obj[RESULT] for obj in bpy.data.objects if RESULT in obj})
+    slots_text = "material slots were added or removed since; as many old materials as there are slots are back"
     return count, sentences(
         (edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
-        (
-            changed_slots,
-            "material slots were added or removed since; as many old materials as there are slots are back",
-        ),
+        (changed_slots, slots_text),
     )
 
 

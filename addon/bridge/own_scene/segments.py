@@ -94,12 +94,8 @@ def segments_of(
 
     Parameters
     ----------
-    pieces : list of Piece
-        Its faces.
-    obj : bpy.types.Object
-        The artist's.
-    own : bool
-        See `mesh.SceneObject.own`.
+    pieces, obj, own
+        Its faces and the rest of a `mesh.SceneObject`.
     name, class_name : str
         Of the whole object.
     first_id : int
@@ -119,16 +115,10 @@ def segments_of(
         order = _largest_first(pieces, keys)
     if len(order) < 2:
         return [Segment(first_id, name, class_name)], [np.zeros(len(piece.slot), np.int32) for piece in pieces]
-    segments = [
-        Segment(
-            first_id + index,
-            f"{name}: {labels[key]}",
-            f"{class_name}: {labels[key]}",
-            part_of=first_id if index else None,
-            **{kind: key},
-        )
-        for index, key in enumerate(order)
-    ]
+    segments = []
+    for index, key in enumerate(order):
+        names, part_of = (f"{whole}: {labels[key]}" for whole in (name, class_name)), first_id if index else None
+        segments.append(Segment(first_id + index, *names, part_of=part_of, **{kind: key}))
     position = {key: index for index, key in enumerate(order)}
     return segments, [np.int32([position.get(value, 0) for value in key.tolist()]) for key in keys]
 

@@ -51,14 +51,10 @@ def writing_back(
     where: str = images.RESULT,
     copies: bool = False,
 ) -> Generator[float, None, tuple[str, ...]]:
-    """Put the recovered materials onto the objects that a capture was made of, one object at a time.
-
-    It yields the share done, so that the window can be redrawn.
+    """Put the recovered materials onto the objects that a capture was made of, one by one; yields the share done.
 
     Parameters
     ----------
-    capture : Capture
-        Made by `capture_scene`.
     atlas_uv : (t, 3, 2) float32
     where : str
         Where the images go: see `results.images`.
@@ -100,9 +96,8 @@ def writing_back(
         if obj.library or obj.override_library:
             linked.append(source.whole)
             continue
-        parts = _parts(
-            source, instances.get(source.object_id, []), slots, capture.mesh.object_id, polygons, descriptions
-        )
+        found = instances.get(source.object_id, [])
+        parts = _parts(source, found, slots, capture.mesh.object_id, polygons, descriptions)
         object_uv = corner_uv[source.corner_start :]
         if not source.own:
             generated.append((source, obj, parts, object_uv))
@@ -247,22 +242,18 @@ class _Assignment:
             copy[COPY_OF] = obj
             copies.setdefault(obj, []).append(copy)
         for obj, new_copies in copies.items():
-            obj[BEFORE] = {
-                "copies": [{"copy": copy} for copy in new_copies],
-                "hide_viewport": obj.hide_viewport,
-                "hide_render": obj.hide_render,
-            }
+            hidden = {"hide_viewport": obj.hide_viewport, "hide_render": obj.hide_render}
+            obj[BEFORE] = {"copies": [{"copy": copy} for copy in new_copies], **hidden}
             obj.hide_viewport = obj.hide_render = True
         return changed
 
     def _evaluated_copy(self, scene_object: SceneObject, depsgraph) -> bpy.types.Object:
         """A new object with evaluated faces as its mesh, in the collections of the artist's object."""
         obj, data = scene_object.obj, None
-        matrix = obj.evaluated_get(depsgraph).matrix_world.copy()
+        evaluated = obj.evaluated_get(depsgraph)
+        matrix = evaluated.matrix_world.copy()
         if obj.type == "MESH" and len(scene_object.pieces) == 1:  # with its own UV maps and all other layers
-            data = bpy.data.meshes.new_from_object(
-                obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
-            )
+            data = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
             if topology_hash([faces_of(data)]) != scene_object.topology:  # its one piece is an instance
                 bpy.data.meshes.remove(data)
                 data = None

@@ -53,16 +53,11 @@ def render_pair(scene: bpy.types.Scene, target: Path, progress: Progress | None 
 
 
 def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool]:
-    """Default folder of a picture of a scene.
+    """Default folder of a picture of a scene, and whether it persists when Blender quits.
 
     The result folder that the open file lies in, else the one that the room came from, else the `chosen` one, else
     beside the file; a folder that is missing or can't be written to is skipped. Where none is left it is Blender's
     temporary folder.
-
-    Returns
-    -------
-    (Path, bool)
-        The folder; whether it persists when Blender quits.
     """
     beside_file = bpy.path.abspath("//") if bpy.data.filepath else ""
     candidates = [item[RESULT] for item in (*scene.collection.children_recursive, *scene.objects) if RESULT in item]

@@ -62,18 +62,12 @@ def relight(
 
     Parameters
     ----------
-    out : Path
-        Ends in .png, .jpg or .exr.
     camera : str, optional
         Number of a frame in the capture's order, from 0, or its name; by default the scene's camera.
-    samples : int
-        0: as the scene says.
-    engine : str
-        `pictures.CYCLES` or `pictures.EEVEE`.
+    samples, engine, percentage
+        See `pictures.prepare`.
     before_after : bool
         Two pictures beside each other: the captured light, the new one.
-    percentage : int
-        Of the frame's size.
     device : str, optional
         See `render_device.use_device`; by default the file's, which Cycles may ignore without preferences.
     scene_name : str, optional
@@ -174,18 +168,13 @@ def set_lamps(scene: bpy.types.Scene, text: str) -> None:
 def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The camera of a frame, by its number from 0 or its name; raises `BadInputError`."""
     cameras = frame_cameras(scene)
-    by_name = {str(number): camera for number, camera in enumerate(cameras)} | {
-        camera.name: camera for camera in reversed(cameras)
-    }
+    by_name = {str(number): camera for number, camera in enumerate(cameras)}
+    by_name |= {camera.name: camera for camera in reversed(cameras)}
     if name in by_name:
         return by_name[name]
     examples = ", ".join(f"'{c.name}'" for c in cameras[:3])
-    hint = (
-        f"take a number from 0 to {len(cameras) - 1} or a name such as {examples}"
-        if cameras
-        else "the scene has none at all"
-    )
-    raise BadInputError(f"There is no camera '{name}'; {hint}.")
+    hint = f"take a number from 0 to {len(cameras) - 1} or a name such as {examples}"
+    raise BadInputError(f"There is no camera '{name}'; {hint if cameras else 'the scene has none at all'}.")
 
 
 def _number(text: str, message: str, minimum: float = -math.inf) -> float:

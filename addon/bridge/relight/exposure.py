@@ -58,9 +58,8 @@ def captured_exposure(scene: bpy.types.Scene) -> float:
 def follow(scene: bpy.types.Scene) -> None:
     """Set the exposure by `relight.estimate`, if that has a result; nothing is rendered."""
     stops = estimate.estimate(scene)
-    if stops is None or stops == estimate.NO_LIGHT:
-        return
-    _set(scene, captured_exposure(scene) - stops)
+    if stops not in (None, estimate.NO_LIGHT):
+        _set(scene, captured_exposure(scene) - stops)
 
 
 def darkness(scene: bpy.types.Scene) -> str:
@@ -73,8 +72,8 @@ def darkness(scene: bpy.types.Scene) -> str:
     raised = scene.view_settings.exposure - captured_exposure(scene)
     if abs(stops + raised) < 0.5:
         return ""
-    light_text = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
-    if abs(stops) < 0.5:
-        light_text = "about as captured"
+    light_text = "about as captured"
+    if abs(stops) >= 0.5:
+        light_text = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
     exposure_text = "as captured" if abs(raised) < 0.05 else f"{abs(raised):.1f} stops {'up' if raised > 0 else 'down'}"
     return f"The light is {light_text}; exposure is {exposure_text}."

@@ -25,13 +25,9 @@ def match_frame(
     index : int
         In the capture's order, clamped to the frames that exist.
     background : bool
-        Show the frame's picture behind the scene, as bright as the scene's exposure shows it.
-    alpha : float
-        Opacity of the picture.
-    front : bool
-        Show it in front of the scene instead.
-    capture_folder : str
-        Where to look for a picture that was moved.
+        Show the frame's picture, as bright as the scene's exposure shows it.
+    alpha, front, capture_folder
+        Its opacity; in front of the scene, not behind it; where to look for one that was moved.
     size : bool
         Render at the frame's size and with its shape of pixels, too.
 

@@ -59,9 +59,9 @@ def settings_kept(scene: bpy.types.Scene) -> Iterator[None]:
 @contextmanager
 def result_kept() -> Iterator[None]:
     """Within: renders go into a slot of their own, so that the artist's Render Result stays."""
-    slots = _render_slots()
-    active_index = slots.active_index if slots is not None else 0
+    slots, active_index = _render_slots(), 0
     if slots is not None:
+        active_index = slots.active_index
         if _SLOT_NAME not in [slot.name for slot in slots]:
             slots.new(name=_SLOT_NAME)
         slots.active_index = [slot.name for slot in slots].index(_SLOT_NAME)

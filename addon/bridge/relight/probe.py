@@ -61,15 +61,8 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
 def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     """Bake the room's light.
 
-    Parameters
-    ----------
-    wait : bool
-        Return when it is done; else, in a window, Blender bakes on, with a bar in its status line, and ESC ends that.
-
-    Raises
-    ------
-    BadInputError
-        There is no room, or no graphics card to bake on; nothing is changed then.
+    Without `wait` Blender bakes on, in a window, with a bar in its status line, and ESC ends that. Raises
+    `BadInputError`: there is no room, or no graphics card to bake on; nothing is changed then.
     """
     if bpy.context.view_layer is None or bpy.context.scene != scene:
         raise BadInputError(f"Switch to scene '{scene.name}' first: what is baked is what the window shows.")

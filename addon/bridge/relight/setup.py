@@ -52,10 +52,7 @@ def setup_of(scene: bpy.types.Scene) -> str:
 def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
     """Light a scene by a set-up of `setup_of`; its new lights are replaced, lamps of unknown classes are as captured.
 
-    Returns
-    -------
-    list of str
-        One sentence where the picture around the room is missing: the recovered outside is used then.
+    Returns a sentence where the picture around the room is missing: the recovered outside is used then.
 
     Raises
     ------
@@ -68,8 +65,8 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
         poses = [Matrix(entry["pose"]) for entry in lights]
         lamps = dict(settings["lamps"])
         states = {name: (bool(entry[0]), float(entry[1]), [*entry, None][2]) for name, entry in lamps.items()}
-        kinds = {entry["kind"] for entry in lights} <= set(PRESETS)
-        valid = kinds and {entry["type"] for entry in lights} <= {"AREA", "SPOT", "SUN", "POINT"}
+        kinds, types = ({entry[name] for entry in lights} for name in ("kind", "type"))
+        valid = kinds <= set(PRESETS) and types <= {"AREA", "SPOT", "SUN", "POINT"}
         valid = valid and all(math.isfinite(c) for pose in poses for row in pose for c in row)
     except (ValueError, TypeError, KeyError, IndexError):
         valid = False
@@ -153,16 +150,13 @@ def _lamp_class(lamp) -> str:
 @contextmanager
 def captured_light(scene: bpy.types.Scene) -> Iterator[None]:
     """Within: recovered lamps and world, no other lights. Afterwards: exactly the artist's light again."""
-    lamps = relight_lamps.find_lamps(scene)
     world, stored_world = scene.world, scene.get(relight_outside.RECOVERED)
     hidden = {obj: obj.hide_render for obj in scene.objects if obj.type == "LIGHT"}
-    states = [(lamp, relight_lamps.snapshot(lamp)) for lamp in lamps]
+    states = [(lamp, relight_lamps.snapshot(lamp)) for lamp in relight_lamps.find_lamps(scene)]
     recovered = relight_outside.recovered_world(scene)
     outside = relight_outside.snapshot(recovered)
     try:
-        for lamp in lamps:
-            relight_lamps.restore(lamp)
-        relight_outside.restore(scene)
+        _restore_found(scene)
         for obj in hidden:
             obj.hide_render = True
         yield
@@ -188,7 +182,11 @@ def is_relit(scene: bpy.types.Scene) -> bool:
 
 def restore_captured(scene: bpy.types.Scene) -> None:
     """Restore the captured light permanently: lamps and outside restored, added lights removed."""
+    _restore_found(scene)
+    remove_lights(scene)
+
+
+def _restore_found(scene) -> None:
     for lamp in relight_lamps.find_lamps(scene):
         relight_lamps.restore(lamp)
     relight_outside.restore(scene)
-    remove_lights(scene)

@@ -86,9 +86,8 @@ def _visible_hits(scene) -> dict[Hit, float]:
     for x, y in PICTURE if scene.camera is not None else ():
         hit = cast(scene, *picture_ray(scene, x, y))
         if hit is not None and OBJECT_ID in hit.obj:
-            weights[hit._replace(location=hit.location.freeze(), normal=hit.normal.freeze())] = math.exp(
-                -((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3**2)
-            )
+            hashable = hit._replace(location=hit.location.freeze(), normal=hit.normal.freeze())
+            weights[hashable] = math.exp(-((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3**2))
     return weights
 
 

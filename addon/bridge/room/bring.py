@@ -20,7 +20,7 @@ from ..results import changes as room_changes
 from ..results import images
 from ..scene.as_made import stamp, stamp_tree
 from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, rooms, scene_name, take_settings
-from .update import commit, note_known, plan
+from .update import Steps, commit, note_known, plan
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,6 @@ def bringing(
 
     Parameters
     ----------
-    folder : Path or str
-        The result folder.
     scene : bpy.types.Scene, optional
         Link the room into this scene and change nothing else of it. By default the room has a scene of its own,
         "Scan Relight: <capture>", with its world, exposure, engine and camera; no other scene is touched.
@@ -77,7 +75,7 @@ def bringing(
             "recovery to its end first."
         )
     top = imported(root) if known else find_room(root)
-    added = AddedData()
+    is_new, steps, added = top is None, Steps(), AddedData()
     try:
         yield 0.0
         shell = _append(folder / SCENE)
@@ -94,8 +92,7 @@ def bringing(
         if shell.world is not None:
             stamp_tree(shell.world)
         findings = room_changes.read_findings(folder)
-        steps = None
-        if top is not None:
+        if not is_new:
             steps = yield from plan(top, fresh)
         yield 0.95
         images.settle(_images(added, folder), where)
@@ -105,21 +102,20 @@ def bringing(
     except BaseException:
         added.remove()
         raise
-    if top is not None:
-        _replace_images(added, top)
-    warnings: list[str] = []
-    if steps is None:
-        top, differences = fresh, ()
+    warnings, differences = [], ()
+    if is_new:
+        top = fresh
         note_known(top, objects)
     else:
+        _replace_images(added, top)
         differences = room_changes.compare(room_changes.stored_findings(top), findings)
         warnings = commit(steps, top, fresh, shell)
         shell.collection.children.unlink(fresh)
     room_changes.store_findings(top, findings)
-    target, messages = _place(top, shell, scene, root, steps is None)
+    target, messages = _place(top, shell, scene, root, is_new)
     room_changes.store_changes(target, differences)
-    added.remove_unused(steps.replaced if steps is not None else ())
-    for datablock, label in steps.names if steps is not None else ():
+    added.remove_unused(steps.replaced)
+    for datablock, label in steps.names:
         datablock.name = label
     yield 0.98
     ready(target)

@@ -71,16 +71,15 @@ def key_of(obj: bpy.types.Object) -> str:
 def objects_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
     """A room's objects, wherever the artist has put them, and their duplicates."""
     root = Path(top[CAPTURE]).resolve()
-    same_capture = {
-        name: Path(name).resolve() == root for name in {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}
-    }
+    captures = {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}
+    same_capture = {name for name in captures if Path(name).resolve() == root}
     collected = {obj for obj in top.all_objects if OBJECT_ID in obj or "pixel_aspect" in obj}
     return [
         obj
         for obj in bpy.data.objects
         if not obj.library
         and obj.users_collection
-        and (same_capture[obj[CAPTURE]] if CAPTURE in obj else obj in collected)
+        and (obj[CAPTURE] in same_capture if CAPTURE in obj else obj in collected)
     ]
 
 
@@ -106,10 +105,8 @@ def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[fl
             steps.added.append(obj)
     for obj in (existing for key, objects in old.items() if key not in new for existing in objects):
         yield 0.9
-        edited = obj.type == "MESH" and (
-            is_edited(obj) or any(_corrected(slot.material) for slot in obj.material_slots)
-        )
-        if edited or obj.children:
+        corrected = any(_corrected(slot.material) for slot in obj.material_slots)
+        if obj.children or obj.type == "MESH" and (corrected or is_edited(obj)):
             steps.kept_removed.append(obj.name)
         else:
             steps.removed.append(obj)
@@ -165,15 +162,12 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
         (part_of(top, collection[PART]) if collection is not None else top).objects.link(obj)
     now = [*(pair.old for pair in steps.pairs), *steps.added]
     corrections.carry(before, corrections.instances_in(now))
-    owned = [
-        datablock for obj in steps.removed for datablock in (obj.data, *(slot.material for slot in obj.material_slots))
-    ]
-    steps.replaced.extend(datablock.session_uid for datablock in owned if datablock is not None)
+    owned = [data for obj in steps.removed for data in (obj.data, *(slot.material for slot in obj.material_slots))]
+    steps.replaced.extend(data.session_uid for data in owned if data is not None)
     if steps.removed:
         bpy.data.batch_remove(steps.removed)
     note_known(top, fresh.all_objects)
-    messages = [sentence for obj in now for sentence in corrections.reapply(obj)]
-    return _messages(steps) + messages
+    return [*_messages(steps), *(sentence for obj in now for sentence in corrections.reapply(obj))]
 
 
 def note_known(top: bpy.types.Collection, objects: Iterable[bpy.types.Object]) -> None:
@@ -181,17 +175,14 @@ def note_known(top: bpy.types.Collection, objects: Iterable[bpy.types.Object]) -
     top[KNOWN] = json.dumps(sorted({*json.loads(top.get(KNOWN, "[]")), *map(key_of, objects)}))
 
 
-def _messages(steps: Steps) -> list[str]:
-    edited, corrected = (
-        [pair.old.name for pair in steps.pairs if getattr(pair, flag)] for flag in ("edited", "corrected")
-    )
-    return list(
-        sentences(
-            (edited, "the mesh was edited and is left as it is; the material is new"),
-            (corrected, "the material was corrected and stays"),
-            (steps.deleted, "was deleted and stays so; delete the room's scene and run again to have it back"),
-            (steps.kept_removed, "is no longer part of the result, but was edited and stays"),
-        )
+def _messages(steps: Steps) -> tuple[str, ...]:
+    edited = [pair.old.name for pair in steps.pairs if pair.edited]
+    corrected = [pair.old.name for pair in steps.pairs if pair.corrected]
+    return sentences(
+        (edited, "the mesh was edited and is left as it is; the material is new"),
+        (corrected, "the material was corrected and stays"),
+        (steps.deleted, "was deleted and stays so; delete the room's scene and run again to have it back"),
+        (steps.kept_removed, "is no longer part of the result, but was edited and stays"),
     )
 
 
@@ -261,13 +252,10 @@ def _dress_slots(pair: Pair, worn: dict[int, list[bpy.types.Material]], steps: S
 
 def _sort(obj: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:
     """Move an object that became a lamp, or ceased to be one, to the other collection, unless the artist moved it."""
-    parts = [
-        collection
-        for collection in obj.users_collection
-        if collection.get(PART) and collection in top.children_recursive
-    ]
+    inside = top.children_recursive
+    parts = [collection for collection in obj.users_collection if collection.get(PART) and collection in inside]
     target = part_of(top, LAMPS if lamp else ROOM)
-    if len(parts) == 1 and parts[0] != target and parts[0].get(PART) in (LAMPS, ROOM):
+    if len(parts) == 1 and parts[0] != target and parts[0][PART] in (LAMPS, ROOM):
         parts[0].objects.unlink(obj)
         target.objects.link(obj)
 

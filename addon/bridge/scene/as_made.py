@@ -84,13 +84,12 @@ def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:
     if written is None:
         return False
     current, original = _values(owner), json.loads(written)
-    nodes = {key.partition("\n")[0] for key in current}
-    for key in _state(owner):
-        original.pop(key, None)
+    nodes, state = {key.partition("\n")[0] for key in current}, _state(owner)
     # If the node is there but not the socket, another version of Blender removed it.
     return any(
-        key.partition("\n")[0] not in nodes or key in current and current[key] != value
+        key.partition("\n")[0] not in nodes or current.get(key, value) != value
         for key, value in original.items()
+        if key not in state
     )
 
 

@@ -88,11 +88,8 @@ def own_scene(top: bpy.types.Collection) -> bpy.types.Scene | None:
 
 EXPOSURE = "scan_relight_exposure"
 """Of a scene of ours: the exposure that it was made with."""
-_CYCLES = (
-    "samples", "use_denoising", "sample_clamp_indirect", "blur_glossy", "max_bounces", "diffuse_bounces",
-    "glossy_bounces",
-)  # fmt: skip
-_RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
+_CYCLES = "samples use_denoising sample_clamp_indirect blur_glossy max_bounces diffuse_bounces glossy_bounces".split()
+_RENDER = "engine resolution_x resolution_y resolution_percentage pixel_aspect_x pixel_aspect_y".split()
 
 
 def dress(scene: bpy.types.Scene) -> None:

@@ -86,9 +86,8 @@ def _build(
     scene.world = make_world("Scan Relight", images.get(ENVIRONMENT))
     stamp_tree(scene.world)
     _prepare(scene, median_radiance)
-    use_camera(
-        scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, camera_collection)
-    )
+    first = cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, camera_collection)
+    use_camera(scene, first)
     scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
     scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
     scene[EXPOSURE] = scene.view_settings.exposure
@@ -186,22 +185,12 @@ def write_scene(
         # Not read_factory_settings: that would disable the running extension itself.
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with nullcontext((bpy.context.scene, None)) if fresh else scene_apart("Scan Relight") as (scene, _):
-        images, warnings = _build(
-            scene, capture, atlas_uv, materials, Path(result_folder).absolute(), median_radiance, parts
-        )
+        folder = Path(result_folder).absolute()
+        images, warnings = _build(scene, capture, atlas_uv, materials, folder, median_radiance, parts)
         for image in images:
             relative_to(image, path.parent)
         _save_whole(path, scene, images, fresh)
     return warnings
-
-
-def _save(name, scene, images, fresh):
-    if fresh:
-        bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
-    else:
-        # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
-        scene.view_layers[0].update()
-        bpy.data.libraries.write(name, {scene, *images}, path_remap="NONE", compress=True, fake_user=False)
 
 
 def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image], fresh: bool) -> None:
@@ -210,7 +199,13 @@ def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             writing.unlink(missing_ok=True)
-            _save(str(writing), scene, images, fresh)
+            if fresh:
+                bpy.ops.wm.save_as_mainfile(filepath=str(writing), copy=True, compress=True, relative_remap=False)
+            else:
+                # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
+                scene.view_layers[0].update()
+                content = {scene, *images}
+                bpy.data.libraries.write(str(writing), content, path_remap="NONE", compress=True, fake_user=False)
             try:  # Blender does not notice a full disk while it compresses, but it does when it reads
                 with bpy.data.libraries.load(str(writing)):
                     pass
