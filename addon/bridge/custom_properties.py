@@ -42,17 +42,7 @@ UV_MAP = "scan_relight_uv_map"
 
 
 def set_run(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
-    """Store which run made an object or a room's collection in its custom properties.
-
-    Parameters
-    ----------
-    folder : Path or str
-        The result folder.
-    run : str
-        Its run's key, as `room_file.run_of` reads it; '' for a result that is older than such keys.
-    capture : Path or str, optional
-        Folder of the capture; for a collection.
-    """
+    """Store which run made an object or a room's collection: its folder, its key (`room_file.run_of`), its capture."""
     owner[RESULT], owner[RUN] = str(Path(folder).absolute()), run
     if capture is not None:
         owner[CAPTURE] = str(Path(capture).absolute())

@@ -29,30 +29,24 @@ def use_device(scene: bpy.types.Scene, device: str) -> str:
     ----------
     device : str
         'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or what
-        `current_device` gave. Whatever the case, but for ids.
+        `current_device` gave. Whatever the case, but for ids. Raises `BadInputError`: there is no such kind.
 
     Returns
     -------
     str
         '' or a remark: why it is the processor.
-
-    Raises
-    ------
-    BadInputError
-        There is no such kind of device.
     """
     kind, _, ids = device.partition("=")
     kind, device_ids = kind.strip().upper(), {card for card in ids.split("|") if card}
     if kind not in (CPU, GPU, *TYPES):
         raise BadInputError(f"There is no device '{device}'; take cpu, gpu or one of {', '.join(TYPES).lower()}.")
+    scene.cycles.device = "CPU"
     if kind == CPU:
-        scene.cycles.device = "CPU"
         return ""
     for device_type in TYPES if kind == GPU else (kind,):
         if _enable(device_type, device_ids):
             scene.cycles.device = "GPU"
             return ""
-    scene.cycles.device = "CPU"
     what = "such graphics card" if kind == GPU else f"{kind} device"
     return f"Blender finds no {what} here, so the processor renders."
 

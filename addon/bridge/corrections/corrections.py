@@ -38,13 +38,9 @@ _written: dict[Path, set[int | str]] = {}
 
 def correctable(obj: bpy.types.Object | None, object_id: int | None = None) -> bool:
     """Whether an object wears a recovered material that can be changed."""
-    return (
-        obj is not None
-        and obj.type == "MESH"
-        and OBJECT_ID in obj
-        and not obj.library
-        and material.worn_material(obj, object_id) is not None
-    )
+    if obj is None or obj.type != "MESH" or OBJECT_ID not in obj or obj.library:
+        return False
+    return material.worn_material(obj, object_id) is not None
 
 
 def result_folder(obj: bpy.types.Object) -> Path | None:
@@ -73,12 +69,10 @@ def given(obj: bpy.types.Object, object_id: int | None = None) -> dict[str, Any]
 
 
 def give(obj: bpy.types.Object, object_id: int | None = None, **values) -> None:
-    """Override values of an object's material and show the result.
+    """Override values of a `correctable` object's material and show the result.
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        `correctable`.
     **values
         As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None removes one. Earlier values that
         contradict them go (`core.results.overrides.merge`).
@@ -90,26 +84,18 @@ def give(obj: bpy.types.Object, object_id: int | None = None, **values) -> None:
     """
     object_id = chosen_in(obj) if object_id is None else object_id
     room = instances_in(room_of(obj))
-    newer = parse(
-        {"objects": {str(object_id): {key: _plain(value) for key, value in values.items()}}},
-        f"Object '{name_of(obj, object_id)}'",
-        room,
-    )
+    content = {"objects": {str(object_id): {key: _plain(value) for key, value in values.items()}}}
+    newer = parse(content, f"Object '{name_of(obj, object_id)}'", room)
     room[object_id] = obj
-    older = {
-        i: Given(**_tuples(given(member, i)))
-        for i, member in room.items()
-        if i == object_id or key_of(GIVEN, member, i) in member
-    }
+    older = {i: _given(member, i) for i, member in room.items() if i == object_id or _is_given(member, i)}
     override = merge(Overrides(older), newer).of(object_id).as_dict()
     material.note(obj, object_id)
     obj[key_of(GIVEN, obj, object_id)] = json.dumps(override)
     show(obj, object_id)
-    for other in room_of(obj):
-        for i in slots_of(other):
-            if (other, i) != (obj, object_id) and key_of(GIVEN, other, i) in other:
-                if given(other, i).get("same_as") == object_id:
-                    show(other, i)
+    others = ((other, i) for other in room_of(obj) for i in slots_of(other) if (other, i) != (obj, object_id))
+    for other, i in others:
+        if _is_given(other, i) and given(other, i).get("same_as") == object_id:
+            show(other, i)
 
 
 def take_back(obj: bpy.types.Object, *keys: str) -> None:
@@ -129,8 +115,14 @@ def _plain(value):
     return [_plain(item) for item in value] if hasattr(value, "__len__") else round(min(max(float(value), 0.0), 1.0), 6)
 
 
-def _tuples(override: dict[str, Any]) -> dict[str, Any]:
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in override.items()}
+def _given(obj: bpy.types.Object, object_id: int) -> Given:
+    override = given(obj, object_id)
+    return Given(**{key: tuple(value) if isinstance(value, list) else value for key, value in override.items()})
+
+
+def _is_given(obj: bpy.types.Object, object_id: int) -> bool:
+    """Whether the scene says of an instance what is given of it, and be it nothing."""
+    return key_of(GIVEN, obj, object_id) in obj
 
 
 def carry(before: dict[int, bpy.types.Object], after: dict[int, bpy.types.Object]) -> None:
@@ -202,16 +194,12 @@ def show(obj: bpy.types.Object, object_id: int | None = None) -> None:
 def reapply(obj: bpy.types.Object) -> list[str]:
     """Restore what the artist did to an object whose mesh or material a run has just made anew.
 
-    Its corrected values, its painted image, its smooth shading. Called at the end of each object's update. Returns
-    warnings on what no longer fits.
+    Its corrected values, its painted image, its smooth shading. Returns warnings on what no longer fits.
     """
     if obj.type == "MESH" and SMOOTH in obj and not obj.data.library:
         shade(obj.data, obj[SMOOTH])
-    made = [
-        object_id
-        for object_id in slots_of(obj)
-        if correctable(obj, object_id) and not is_corrected(material.worn_material(obj, object_id))
-    ]
+    worn = {i: material.worn_material(obj, i) for i in slots_of(obj) if correctable(obj, i)}
+    made = [object_id for object_id, recovered in worn.items() if not is_corrected(recovered)]
     for object_id in made:
         material.renew(obj, object_id, given(obj, object_id))
     messages = unseen.reapply(obj) if made else []
@@ -291,16 +279,12 @@ def keep(scene: bpy.types.Scene, folder: Path, objects: Iterable[bpy.types.Objec
 
     Raises
     ------
-    BadInputError
-        The file is damaged.
-    StorageError
-        It can't be written.
+    BadInputError, StorageError
+        The file is damaged, or can't be written.
     """
     if objects is None:
         objects = [obj for obj in look.recovered(scene) if result_folder(obj) == folder]
-    scene_entries = {
-        i: Given(**_tuples(given(obj, i))) for obj in objects for i in slots_of(obj) if key_of(GIVEN, obj, i) in obj
-    }
+    scene_entries = {i: _given(obj, i) for obj in objects for i in slots_of(obj) if _is_given(obj, i)}
     result = made_by(folder)
     stored = kept_overrides(folder, {*result, *instances_in(objects)})
     written = _written.setdefault(folder, set())

@@ -22,8 +22,6 @@ def of_object(
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        `corrections.correctable`.
     location : Vector
         The spot, on its surface; world, metres.
     albedo : (3,) tuple of float
@@ -77,9 +75,9 @@ def _uv(obj, location, depsgraph):
     data = obj.data
     local = obj.matrix_world.inverted() @ location
     _, nearest, _, face = obj.closest_point_on_mesh(local, depsgraph=depsgraph)
-    polygon = data.polygons[face] if 0 <= face < len(data.polygons) else None
-    if polygon is None:
+    if not 0 <= face < len(data.polygons):
         raise BadInputError(f"'{obj.name}' was changed by a modifier there; click on another spot.")
+    polygon = data.polygons[face]
     weights = poly_3d_calc([data.vertices[index].co for index in polygon.vertices], nearest)
     layer = data.uv_layers[ATLAS_UV].uv
     corners = [layer[loop].vector for loop in polygon.loop_indices]

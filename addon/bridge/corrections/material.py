@@ -74,21 +74,13 @@ def renew(obj: bpy.types.Object, object_id: int, given: dict[str, Any]) -> None:
     worn_material(obj, object_id).pop(WORN, None)
     keys = given.keys() | (set(LOBE) if {"model", "same_as"} & given.keys() else set())
     found = key_of(FOUND, obj, object_id)
-    remaining = {key: value for key, value in json.loads(obj.get(found, "{}")).items() if key in keys}
+    remaining = {key: value for key, value in json.loads(obj.pop(found, "{}")).items() if key in keys}
     if remaining:
         obj[found] = json.dumps(remaining)
-    else:
-        obj.pop(found, None)
 
 
 def show(obj: bpy.types.Object, object_id: int, values: dict[str, Any]) -> None:
-    """Bring a material in line.
-
-    Parameters
-    ----------
-    values : dict
-        `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
-    """
+    """Bring a material in line with `values`, as of `recovered_values`; what the run made is brought back exactly."""
     material, original = worn_material(obj, object_id), worn(obj, object_id)
     if WORN not in material:
         if values == original:
@@ -169,8 +161,5 @@ def _tint(material, colour, mean) -> None:
     factors = [target / current for target, current in zip(colour, mean, strict=True)]
     if max(abs(factor - 1) for factor in factors) < 0.005:
         return
-    texture = socket.links[0].from_socket
-    out = mix_node(
-        tree, 1.0, texture, (*factors, 1), name=TINT, label=TINT, blend_type="MULTIPLY", location=(-200, 200)
-    )
-    feed(socket, out)
+    texture, settings = socket.links[0].from_socket, {"name": TINT, "label": TINT, "blend_type": "MULTIPLY"}
+    feed(socket, mix_node(tree, 1.0, texture, (*factors, 1), location=(-200, 200), **settings))

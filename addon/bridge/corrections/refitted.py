@@ -36,19 +36,13 @@ def words(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> tuple[
 
     Returns
     -------
-    folder : Path
-        The result folder.
-    words : list of str
-        Of the command line.
-    before : dict of int to dict
-        The entries of materials.json as they are now.
+    Path, list of str, dict of int to dict
+        The result folder, words of the command line, and the entries of materials.json as they are now.
 
     Raises
     ------
-    BadInputError
-        The result is gone, or they are of several.
-    StorageError
-        Its `overrides.json` can't be written.
+    BadInputError, StorageError
+        The result is gone, or they are of several; its `overrides.json` can't be written.
     """
     objects = list(objects)
     folder = corrections.folder_for(objects)
@@ -70,14 +64,8 @@ def bringing(
 ) -> Generator[float, None, tuple[str, ...]]:
     """Put onto a scene's objects what a refit changed; yields the share done, returns warnings.
 
-    Only materials that the refit changed are made anew, so that what an artist did to others by hand stays.
-
-    Parameters
-    ----------
-    folder : Path
-        The result folder.
-    after : result_file.Result
-        What `words` and `fitted` gave.
+    Only materials that the refit changed are made anew, so that what an artist did to others by hand stays. `folder`
+    and `before` are what `words` gave, `after` what `fitted` gave.
     """
     objects = [obj for obj in scene.objects if _wears_some(obj) and corrections.result_folder(obj) == folder]
     image = _renew_images(folder)

@@ -60,10 +60,7 @@ def painted(obj: bpy.types.Object) -> bpy.types.Image | None:
 def own_image(obj: bpy.types.Object, where: str = images.PACK) -> bpy.types.Image:
     """The artist's image of an object; made where there is none yet, and shown.
 
-    Parameters
-    ----------
-    where : str
-        `results.images.FOLDER`: a file beside the saved .blend; else packed into it.
+    With `where` = `results.images.FOLDER` it is a file beside the saved .blend, else packed into it.
 
     Raises
     ------
@@ -200,19 +197,12 @@ def paint(context: bpy.types.Context, obj: bpy.types.Object, where: str, colour,
 
     Parameters
     ----------
-    context : bpy.types.Context
-        `obj` is its active object.
     where : str
-        Where the canvas goes, see `own_image`.
+        Where the canvas goes, see `own_image`; raises as that and `unseen_mask`.
     colour : (3,) of float or None
         Linear Rec.709: what the brush begins with.
     masked : bool
         Protect what any frame saw.
-
-    Raises
-    ------
-    BadInputError, StorageError
-        As of `own_image` and `unseen_mask`.
     """
     if masked:
         unseen_mask(obj)  # raises before anything is changed
@@ -234,23 +224,18 @@ def paint(context: bpy.types.Context, obj: bpy.types.Object, where: str, colour,
         brush.color = [min(max(c, 0.0), 1.0) for c in (colour.from_scene_linear_to_srgb() if gamma else colour)]
 
 
-def fill(objects: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
+def fill(objects: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, tuple[str, ...]]:
     """Fill what no frame saw of objects from the measured spots around, on the artist's image.
 
     Each spot becomes the mean of the `LEVELS.neighbours` measured ones of its object that lie nearest and face alike;
-    what was seen stays as it is.
+    what was seen stays as it is. Raises as `own_image` and `unseen_mask`; nothing is changed then.
 
     Returns
     -------
     count : int
         Texels that were filled.
-    remarks : list of str
+    remarks : tuple of str
         Sentences on objects that were passed over.
-
-    Raises
-    ------
-    BadInputError, StorageError
-        As of `own_image` and `unseen_mask`; nothing is changed then.
     """
     groups: dict[str, list] = {}
     skipped: dict[str, list[str]] = {}
@@ -262,20 +247,18 @@ def fill(objects: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple
             groups.setdefault(path_of(node.image), []).append(obj)
     coverages = {path: coverage(members[0]) for path, members in groups.items()}
     count = sum(_fill(members, coverages[path], where, skipped) for path, members in groups.items())
-    return count, list(sentences(*((names, why) for why, names in skipped.items())))
+    return count, sentences(*((names, why) for why, names in skipped.items()))
 
 
 def _fill(objects, coverage_map, where, skipped) -> int:
     """`fill` for objects that show the same image, whose coverage is `coverage_map`."""
     from scipy.spatial import cKDTree
 
-    owners = _in_same_atlas(objects[0])
-    atlas = _elements(owners, coverage_map.shape[0])
+    owners, atlas = _elements(objects[0], coverage_map.shape[0])
     observed, quality = (coverage_map[..., k].ravel()[atlas.texel] for k in (0, 2))
-    index_of = {obj: k for k, obj in enumerate(owners)}
     filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
     for obj in objects:
-        elements = np.flatnonzero(atlas.object_id == index_of[obj])
+        elements = np.flatnonzero(atlas.object_id == owners.index(obj))
         unseen = elements[observed[elements] < 0.5]
         measured = elements[(observed[elements] >= 0.5) & was_measured(quality[elements])]
         if not len(unseen) or not len(measured):
@@ -286,10 +269,9 @@ def _fill(objects, coverage_map, where, skipped) -> int:
         spots[obj] = unseen, measured
     flat = image_array(image).reshape(coverage_map.shape[0] * coverage_map.shape[1], -1) if spots else None
     for unseen, measured in spots.values():
-        tree, neighbours = cKDTree(atlas.place(measured)), min(LEVELS.neighbours, len(measured))
-        distance, near = (
-            values.reshape(len(unseen), -1) for values in tree.query(atlas.place(unseen), neighbours, workers=-1)
-        )
+        neighbours = min(LEVELS.neighbours, len(measured))
+        nearest = cKDTree(atlas.place(measured)).query(atlas.place(unseen), neighbours, workers=-1)
+        distance, near = (values.reshape(len(unseen), -1) for values in nearest)
         weight = 1 / (distance**2 + atlas.texel_edge**2)
         value[unseen] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
         filled[unseen] = True
@@ -308,29 +290,26 @@ def room_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
     return [other for other in candidates if OBJECT_ID in other and other.get(RESULT) == obj.get(RESULT)]
 
 
-def _in_same_atlas(obj: bpy.types.Object) -> list[bpy.types.Object]:
-    """All objects of the room whose texture coordinates lie in the same atlas."""
-    return [other for other in room_of(obj) if other.type == "MESH" and ATLAS_UV in other.data.uv_layers]
-
-
-def _elements(objects: list[bpy.types.Object], size: int) -> Atlas:
+def _elements(obj: bpy.types.Object, size: int) -> tuple[list[bpy.types.Object], Atlas]:
+    """The objects in the atlas of one, and its surface elements, whose `object_id` is the place among those objects."""
     from ...core.scene.elements import make_atlas
 
+    objects = [other for other in room_of(obj) if other.type == "MESH" and ATLAS_UV in other.data.uv_layers]
     vertices, triangles, uv, object_ids, first = [], [], [], [], 0
-    for k, obj in enumerate(objects):
-        data = obj.data
-        vertices.append(vertices_of(data, obj.matrix_world).astype(np.float32))
+    for k, owner in enumerate(objects):
+        data = owner.data
+        vertices.append(vertices_of(data, owner.matrix_world).astype(np.float32))
         triangles.append(triangles_of(data) + first)
         uv.append(layer_of(data, ATLAS_UV)[triangles_of(data, "loops")])
         object_ids.append(np.full(len(triangles[-1]), k, np.int32))
         first += len(data.vertices)
-    return make_atlas(Mesh(*map(np.concatenate, (vertices, triangles, object_ids))), np.concatenate(uv), size)
+    mesh = Mesh(*map(np.concatenate, (vertices, triangles, object_ids)))
+    return objects, make_atlas(mesh, np.concatenate(uv), size)
 
 
 def _renew(image, source, obj) -> None:
     """Copy an object's texels from the result's image."""
-    owners = _in_same_atlas(obj)
-    atlas = _elements(owners, image.size[0])
+    owners, atlas = _elements(obj, image.size[0])
     mask = atlas.object_id[atlas.padding] == owners.index(obj)
     pixels = image_array(image)
     pixels.reshape(-1, pixels.shape[2])[mask, :3] = image_array(source).reshape(len(mask), -1)[mask, :3]
@@ -349,7 +328,8 @@ def _save_beside(image) -> None:
     path = saved.parent / f"{saved.stem} images" / f"{bpy.path.clean_name(image.name)}.exr"
     with refused(f"'{path}' can't be written", "free some space or save the file elsewhere"):
         path.parent.mkdir(exist_ok=True)
-        image.unpack(method="REMOVE") if image.packed_file else None
+        if image.packed_file:
+            image.unpack(method="REMOVE")
         image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
         image.save()
 

@@ -31,8 +31,6 @@ def load_image(
         One with ``<UDIM>`` in its name stands for all its tiles. The image's path is absolute (see `relative_to`).
     name : str, optional
         Name of the image in Blender; the file's stem if left out.
-    colour_space : str
-        `RADIANCE` or `DATA`.
     keep : bool
         Give it a fake user, so that it is saved although no material shows it.
 
@@ -102,9 +100,7 @@ def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> 
     Parameters
     ----------
     pixels : (h, w), (h, w, 3) or (h, w, 4) float
-        Row 0 at the bottom. Linear Rec.709 for `RADIANCE`.
-    colour_space : str
-        `RADIANCE` or `DATA`.
+        Row 0 at the bottom; in `colour_space`, `RADIANCE` or `DATA`.
     """
     pixels = np.atleast_3d(pixels)
     height, width, channels = pixels.shape

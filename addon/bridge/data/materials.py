@@ -42,6 +42,8 @@ def make_material(
 ) -> bpy.types.Material:
     """Make the material of one object.
 
+    Its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell what was fitted.
+
     Parameters
     ----------
     base_color : bpy.types.Image, optional
@@ -49,11 +51,6 @@ def make_material(
         Without it the colour is mid-grey.
     one_sided : bool
         Emitter: shine on the side of the normals only.
-
-    Returns
-    -------
-    bpy.types.Material
-        Its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell what was fitted.
     """
     return dress(bpy.data.materials.new(description.name), description, base_color, one_sided)
 

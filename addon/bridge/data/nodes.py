@@ -62,15 +62,7 @@ def _behind(socket: bpy.types.NodeSocket, visited: set) -> Iterator[bpy.types.No
 
 
 def make_world(name: str, image: bpy.types.Image | None, strength: float = 1.0) -> bpy.types.World:
-    """A world that shows an equirectangular picture, or black.
-
-    Parameters
-    ----------
-    image : bpy.types.Image, optional
-        Radiance, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi), v = 0.5 + asin(z) / pi.
-    strength : float
-        Factor on the radiance.
-    """
+    """A world that shows an equirectangular picture of radiance, laid out as docs/architecture.md states, or black."""
     world = bpy.data.worlds.new(name)
     tree = fresh_tree(world)
     texture = image and add_node(tree, "ShaderNodeTexEnvironment", image=image, location=(-300, 0)).outputs[0]

@@ -18,11 +18,6 @@ def comparison(capture: Path, result: Path) -> str:
 
     Base colours are means over the surface that the frames see, of all parts of an object; what they don't see nobody
     can recover. Model, roughness, F0 and lamp are the main part's.
-
-    Parameters
-    ----------
-    capture : Path
-        The demo's, with its truth.
     """
     truth = json.loads((capture / "truth" / "materials.json").read_text())
     true_colours = seen_albedo(read_capture(capture))

@@ -31,13 +31,7 @@ FORMAT: Workload[int] = 3
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
     """Render the demo's room into `folder`, unless it is there already; returns `folder`.
 
-    Parameters
-    ----------
-    folder : Path
-        Becomes a capture: transforms.json, mesh.ply, info_semantic.json, images/, and truth/materials.json, which
-        only the demo's comparison reads.
-    size : str
-        One of `SIZES`.
+    `size` is one of `SIZES`. Only the demo's comparison reads truth/materials.json of that capture.
     """
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):

@@ -26,6 +26,11 @@ ROOM, SELECTED, ALL = "ROOM", "SELECTED", "ALL"
 _BESIDE = (".usdc", ".usd", ".usda")
 """Formats whose textures we write beside the file ourselves."""
 _COLLECTION = "Scan Relight export"
+_USD = dict(export_materials=True, generate_preview_surface=True, rename_uvmaps=True, relative_paths=True)
+_USD |= dict(overwrite_textures=True, evaluation_mode="RENDER", convert_world_material=True)
+_GLTF = dict(export_apply=True, export_lights=True, export_cameras=True, export_yup=True, export_image_format="AUTO")
+_GLTF |= dict(export_extras=False, export_animations=False, use_active_scene=True)
+"""Settings of Blender's exporters."""
 
 
 def can_export(ending: str) -> str:
@@ -60,10 +65,8 @@ def export(
 
     Raises
     ------
-    BadInputError
-        Nothing to export, an unknown ending, or this Blender can't write the format.
-    StorageError
-        The file can't be written.
+    BadInputError, StorageError
+        Nothing to export, or this Blender can't write the format; the file can't be written.
     """
     path = Path(path).absolute()
     ending = path.suffix.lower()
@@ -154,9 +157,8 @@ def copies(
                 if old_slot.material is None:
                     continue
                 if old_slot.material not in plain_materials:
-                    plain_materials[old_slot.material] = plain_copy(
-                        old_slot.material, textures, pictures, level, _tiles(obj)
-                    )
+                    copied = plain_copy(old_slot.material, textures, pictures, level, _tiles(obj))
+                    plain_materials[old_slot.material] = copied
                 slot.link = "OBJECT"
                 slot.material = plain_materials[old_slot.material]
         for material, name in zip(plain_materials, unique(map(own_name, plain_materials))):
@@ -208,33 +210,11 @@ def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.Worl
 
 def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
     if FORMATS[ending] == "USD":
-        bpy.ops.wm.usd_export(
-            filepath=str(path),
-            collection=collection.name,
-            export_materials=True,
-            generate_preview_surface=True,
-            rename_uvmaps=True,
-            relative_paths=True,
-            export_textures_mode="KEEP" if ending in _BESIDE else "NEW",
-            overwrite_textures=True,
-            evaluation_mode="RENDER",
-            convert_world_material=True,
-        )
-        return
-    bpy.ops.export_scene.gltf(
-        filepath=str(path),
-        export_format=FORMATS[ending],
-        collection=collection.name,
-        export_apply=True,
-        export_lights=True,
-        export_cameras=True,
-        export_yup=True,
-        export_image_format="AUTO",
-        export_texture_dir=textures_of(path),
-        export_extras=False,
-        export_animations=False,
-        use_active_scene=True,
-    )
+        settings = _USD | {"export_textures_mode": "KEEP" if ending in _BESIDE else "NEW"}
+        bpy.ops.wm.usd_export(filepath=str(path), collection=collection.name, **settings)
+    else:
+        settings = _GLTF | {"export_format": FORMATS[ending], "export_texture_dir": textures_of(path)}
+        bpy.ops.export_scene.gltf(filepath=str(path), collection=collection.name, **settings)
 
 
 def textures_of(path: Path) -> str:
@@ -251,9 +231,8 @@ def put(staging: Path, path: Path) -> None:
     if not (staging / path.name).is_file() or not (staging / path.name).stat().st_size:
         raise OSError(0, "Blender's exporter wrote nothing")
     path.parent.mkdir(parents=True, exist_ok=True)
-    names = sorted(
-        {entry.name for entry in staging.iterdir()} | {textures_of(path)}, key=lambda name: name == path.name
-    )
+    written = {entry.name for entry in staging.iterdir()}
+    names = sorted(written | {textures_of(path)}, key=lambda name: name == path.name)
     partial, backup = ({name: path.parent / f".{kind}-{name}" for name in names} for kind in ("partial", "before"))
     done = []
     try:
@@ -339,7 +318,5 @@ class Names:
     def put_back(self) -> None:
         """Restore all names; the copies have to be removed before."""
         for item, name in reversed(self._before):
-            try:
+            with suppress(ReferenceError):  # a copy, gone by now
                 item.name = name
-            except ReferenceError:  # a copy, gone by now
-                continue

@@ -1,5 +1,6 @@
 """A recovered material in plain Principled terms: numbers, one 8-bit picture over the atlas, one colour of light."""
 
+from itertools import chain, count
 from pathlib import Path
 
 import bpy
@@ -34,11 +35,7 @@ FIRST_TILE: Code[int] = 1001
 
 
 def plain_copy(
-    material: bpy.types.Material,
-    textures: Path,
-    pictures: dict,
-    level: bool = True,
-    tiles: frozenset[int] = frozenset(),
+    material: bpy.types.Material, textures: Path, pictures: dict, level: bool, tiles: frozenset[int]
 ) -> bpy.types.Material:
     """A material that exporters understand.
 
@@ -94,21 +91,12 @@ def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.
         return image, 0
     if len(tiles) == 1:
         return image, next(iter(tiles))
-    folder = Path(bpy.path.abspath(image.filepath)).parent
-    whole = next(
-        (
-            candidate
-            for candidate in bpy.data.images
-            if candidate.source == "FILE"
-            and UV_MAP not in candidate
-            and (
-                candidate.get(IMAGE) == str(folder / WHOLE)
-                or Path(bpy.path.abspath(candidate.filepath)) == folder / WHOLE
-            )
-        ),
-        None,
-    )
-    return (whole, 0) if whole else (image, min(tiles, default=FIRST_TILE))
+    path = Path(bpy.path.abspath(image.filepath)).parent / WHOLE
+    for whole in bpy.data.images:
+        if whole.source == "FILE" and UV_MAP not in whole:
+            if whole.get(IMAGE) == str(path) or Path(bpy.path.abspath(whole.filepath)) == path:
+                return whole, 0
+    return image, min(tiles, default=FIRST_TILE)
 
 
 def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
@@ -132,12 +120,9 @@ def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
 def _file_name(image: bpy.types.Image, textures: Path) -> str:
     """A name that the folder does not hold yet, whatever the case."""
     taken = {path.stem.casefold() for path in textures.iterdir()}
-    plain = name = bpy.path.clean_name(split_number(image.name)[0])
-    number = 1
-    while name.casefold() in taken:
-        number += 1
-        name = f"{plain}_{number}"
-    return name
+    plain = bpy.path.clean_name(split_number(image.name)[0])
+    names = chain([plain], (f"{plain}_{number}" for number in count(2)))
+    return next(name for name in names if name.casefold() not in taken)
 
 
 def _picture(image: bpy.types.Image, tile: int, textures: Path, pictures: dict) -> bpy.types.Image:

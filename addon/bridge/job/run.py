@@ -41,22 +41,8 @@ def run(
 ) -> dict:
     """Recover a capture as far as is requested; stages that the result folder holds already are not done again.
 
-    Parameters
-    ----------
-    out_folder : path
-        Made where absent.
-    fresh : bool
-        scene.blend is made from an empty file: what is open in this process is lost; False leaves that as it is.
-
-    Returns
-    -------
-    dict
-        What report.json holds.
-
-    Raises
-    ------
-    ScanRelightError
-        One sentence for the user.
+    With `fresh` scene.blend is made from an empty file: what is open in this process is lost; else that stays as it is.
+    Returns what report.json holds. Raises `ScanRelightError`: one sentence for the user.
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     request.check(capture_folder, out_folder)
@@ -83,7 +69,7 @@ def refit(
     heed_kept: bool = True,
     scene: bool = True,
 ) -> dict:
-    """Fit objects of a result again with all else held; `progress` and errors as in `run`, the rest as in `Request`.
+    """Fit objects of a result again with all else held; what is not named below is as in `run` and in `Request`.
 
     Parameters
     ----------
@@ -93,11 +79,6 @@ def refit(
         Those to fit; those of which something new is given are fitted besides.
     scene : bool
         Also write scene.blend, from an empty file: what is open in this process is lost.
-
-    Returns
-    -------
-    dict
-        What report.json holds.
     """
     started = time.monotonic()
     progress.stage(READ)

@@ -62,17 +62,8 @@ def set_rotation(world: bpy.types.World, angle: float) -> None:
 def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None) -> bpy.types.World:
     """Put an equirectangular picture around the room; the recovered outside is kept for `restore`.
 
-    Parameters
-    ----------
-    path : path
-        EXR, HDR or any picture that Blender reads.
-    mean : float, optional
-        Mean radiance that the picture is scaled to; None leaves it as it is.
-
-    Raises
-    ------
-    BadInputError
-        The file is missing or no picture.
+    `mean` is the mean radiance that it is scaled to; None leaves it as it is. Raises `BadInputError`: the file is
+    missing, or no picture that Blender reads.
     """
     path = Path(path).absolute()
     if not path.is_file():
@@ -87,10 +78,8 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
         raise BadInputError(f"'{path}' can't be opened as a picture; choose an equirectangular EXR or HDR file.")
     if image.is_float:
         image.colorspace_settings.name = RADIANCE
-    strength = 1.0
-    if mean is not None:
-        picture_mean = mean_radiance(image)
-        strength = mean / picture_mean if picture_mean > 0 else 1.0
+    picture_mean = mean_radiance(image) if mean is not None else 0.0
+    strength = mean / picture_mean if picture_mean > 0 else 1.0
     if HDRI not in (scene.world or {}) and scene.world is not None:
         scene[RECOVERED] = scene.world
     scene.world = make_world(f"Scan Relight {path.stem}", image, strength)
@@ -222,9 +211,8 @@ def sky(world: bpy.types.World, turn: float) -> list[tuple[Vector, float]]:
     for row, column in np.ndindex(light.shape):
         angle, z = turn + math.pi * (1 - (2 * column + 1) / _COLUMNS), (rims[row] + rims[row + 1]) / 2
         level, solid_angle = math.sqrt(1 - z * z), (rims[row + 1] - rims[row]) * 2 * math.pi / _COLUMNS
-        samples.append(
-            (Vector((level * math.cos(angle), level * math.sin(angle), z)), float(light[row, column] * solid_angle))
-        )
+        direction = Vector((level * math.cos(angle), level * math.sin(angle), z))
+        samples.append((direction, float(light[row, column] * solid_angle)))
     return samples
 
 

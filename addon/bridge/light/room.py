@@ -106,11 +106,8 @@ def target_of(scene: bpy.types.Scene, kind: str = VIEW, obj: bpy.types.Object | 
     if kind == CURSOR:
         return scene.cursor.location.copy()
     low, high = bounds(scene)
-    if scene.camera:
-        hit = cast(scene, *picture_ray(scene))
-        if hit:
-            return hit.location
-    return (low + high) / 2
+    hit = cast(scene, *picture_ray(scene)) if scene.camera else None
+    return hit.location if hit else (low + high) / 2
 
 
 def picture_ray(scene: bpy.types.Scene, x: float = 0.5, y: float = 0.5) -> tuple[Vector, Vector]:
@@ -135,12 +132,10 @@ def view_direction(scene: bpy.types.Scene) -> Vector:
 
 def room_light(scene: bpy.types.Scene) -> float:
     """Median irradiance of the scanned room's surfaces in the frames' unit: by the shading, else the exposure."""
-    stored = scene.get(ROOM_LIGHT)
-    if stored:
-        return float(stored)
-    irradiance = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / TYPICAL_ALBEDO
-    scene[ROOM_LIGHT] = irradiance
-    return irradiance
+    if not scene.get(ROOM_LIGHT):
+        by_exposure = math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / TYPICAL_ALBEDO
+        scene[ROOM_LIGHT] = _median_shading() or by_exposure
+    return float(scene[ROOM_LIGHT])
 
 
 def _median_shading() -> float | None:

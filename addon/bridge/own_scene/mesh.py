@@ -87,12 +87,7 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
     depsgraph : bpy.types.Depsgraph
         Up to date.
     objects : iterable of bpy.types.Object
-        The artist's; those without a surface are skipped.
-
-    Returns
-    -------
-    list of SceneObject
-        In the order of `objects`; one without faces is left out. Same scene, same numbers.
+        The artist's; those without faces are left out. Their order is kept: same scene, same numbers.
 
     Raises
     ------

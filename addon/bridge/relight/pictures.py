@@ -80,16 +80,14 @@ def _render_slots():
 
 
 def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, percentage: int = 0) -> None:
-    """Set a scene up for a picture; to be called within `settings_kept`.
+    """Set a scene up for a picture, within `settings_kept`.
 
     Parameters
     ----------
     engine : str
         `CYCLES` or `EEVEE`.
-    samples : int
-        For each pixel; 0: the scene's.
-    percentage : int
-        Of the scene's size; 0: the scene's.
+    samples, percentage : int
+        For each pixel; of the size. 0: the scene's.
     """
     render = scene.render
     eevee = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"

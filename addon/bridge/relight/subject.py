@@ -33,16 +33,14 @@ class Subject:
 
     Attributes
     ----------
-    target : Vector
-        Point that the light is aimed at, metres.
+    target, radius
+        Point that the light is aimed at, and how far around it belongs to it; metres.
     name : str
         Of the object; '' where it is the whole view.
     points, normals : (n, 3) float64
         Surface points that the picture shows, metres, and their normals.
     weights : (n,) float64
         Weight of each point; their sum is 1.
-    radius : float
-        Metres around the target that belong to it.
     """
 
     target: Vector

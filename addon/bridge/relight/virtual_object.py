@@ -38,23 +38,14 @@ _DOWN = Vector((0, 0, -1))
 def add_virtual(
     scene: bpy.types.Scene, shape: str, size: float = 0.3, look: str = MATTE, surface: Hit | None = None
 ) -> bpy.types.Object:
-    """Make a simple object and stand it on a surface of the room.
+    """Make a simple object and stand it on a surface of the room; `surface` and errors as of `stand`.
 
     Parameters
     ----------
-    shape : str
-        One of `SHAPES`.
+    shape, look : str
+        One of `SHAPES`, and of `LOOKS`.
     size : float
         Largest extent in metres.
-    look : str
-        One of `LOOKS`.
-    surface : Hit, optional
-        The surface; by default what `place_in_view` finds.
-
-    Raises
-    ------
-    BadInputError
-        No room, or no surface to stand on.
     """
     surface = surface or place_in_view(scene)
     mesh = bpy.data.meshes.new(NAMES[shape])
@@ -93,12 +84,10 @@ def set_look(obj: bpy.types.Object, look: str) -> None:
 
 
 def stand(scene: bpy.types.Scene, obj: bpy.types.Object, surface: Hit | None = None) -> None:
-    """Place an object on a surface of the room: clear of the walls, lowered until it touches.
+    """Place an object on a surface of the room: clear of the walls, lowered until it touches, otherwise as it is.
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        Its rotation and scale stay.
     surface : Hit, optional
         The surface; by default what `place_in_view` finds. A vertical one means the floor in front of it.
 

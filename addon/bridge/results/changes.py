@@ -45,10 +45,8 @@ def store_findings(collection: bpy.types.Collection, findings: dict[str, dict[st
 def compare(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> tuple[dict[str, Any], ...]:
     """The objects with visible differences, the greatest first."""
     changes = []
-    for key, new in after.items():
-        old = before.get(key)
-        if old is None:
-            continue
+    for key in (key for key in after if key in before):
+        old, new = before[key], after[key]
         rank, sentences = 0.0, []
         if old["model"] != new["model"]:
             rank, sentences = 10.0, [f"{old['model']}, now {new['model']}"]
@@ -57,9 +55,8 @@ def compare(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]])
                 rank += abs(new[name] - old[name]) / threshold
                 sentences.append(f"{name} {old[name]:.2f}, now {new[name]:.2f}")
         if sentences:
-            changes.append(
-                (-rank, {"object_id": int(key), "name": new["name"], "text": f"{new['name']}: {'; '.join(sentences)}."})
-            )
+            text = f"{new['name']}: {'; '.join(sentences)}."
+            changes.append((-rank, {"object_id": int(key), "name": new["name"], "text": text}))
     return tuple(change for _, change in sorted(changes, key=lambda pair: pair[0]))
 
 

@@ -27,16 +27,10 @@ def results_folder(preferred: str = "") -> Path:
 
 
 def result_folder(capture: Path, results_root: Path, scene: bpy.types.Scene | None = None) -> Path:
-    """The default result folder of a capture; it is not created here.
+    """The default result folder of a capture, an absolute path; it is not created here.
 
-    Parameters
-    ----------
-    capture : Path
-        Absolute.
-    results_root : Path
-        The return value of `results_folder`.
-    scene : bpy.types.Scene, optional
-        Where it has a room of this capture, that room's result folder is used.
+    That of the room of this capture which `scene` has; else a new one, beside the .blend or in `results_root`, which
+    is what `results_folder` gave.
     """
     existing = _result_of_room(scene, capture) if scene is not None else None
     return existing or own_folder(folder_beside_file() or results_root, capture)
@@ -57,9 +51,8 @@ def folder_beside_file() -> Path | None:
     if not bpy.data.filepath:
         return None
     folder = Path(bpy.data.filepath).parent
-    temporary = {
-        Path(path).resolve() for path in (tempfile.gettempdir(), bpy.app.tempdir) if path
-    }  # recovered sessions
+    # Recovered sessions lie there.
+    temporary = {Path(path).resolve() for path in (tempfile.gettempdir(), bpy.app.tempdir) if path}
     if folder.resolve() in temporary or is_in_extension(folder) or not os.access(folder, os.W_OK):
         return None
     return folder / FOLDER_BESIDE
@@ -75,12 +68,9 @@ def display_path(folder: Path) -> str:
 
 def is_in_extension(folder: Path) -> bool:
     """Whether removing or updating the extension could delete a folder."""
-    extension_folders = [Path(__file__).parents[3]]
-    extensions = bpy.utils.user_resource("EXTENSIONS")
-    if extensions:
-        extension_folders.append(Path(extensions))  # includes the folder that Blender has for each extension
-    folder = folder.resolve()
-    return any(folder.is_relative_to(root.resolve()) for root in extension_folders)
+    extensions = bpy.utils.user_resource("EXTENSIONS")  # includes the folder that Blender has for each extension
+    roots = [Path(__file__).parents[3], *([Path(extensions)] if extensions else ())]
+    return any(folder.resolve().is_relative_to(root.resolve()) for root in roots)
 
 
 def check(folder: str) -> None:
@@ -99,7 +89,7 @@ def _result_of_room(scene: bpy.types.Scene, capture: Path) -> Path | None:
         if not folder_name or collection.get(CAPTURE) != str(capture):
             continue
         folder = Path(folder_name)
-        open_file = Path(bpy.data.filepath) if bpy.data.filepath else None
-        if capture in captures(folder) and not is_in_extension(folder) and open_file != folder / SCENE:
+        is_open = Path(bpy.data.filepath) == folder / SCENE
+        if capture in captures(folder) and not is_in_extension(folder) and not is_open:
             return folder
     return None

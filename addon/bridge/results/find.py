@@ -5,7 +5,6 @@ A result is identified by its run's key, never by its name alone.
 
 import time
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -35,10 +34,8 @@ class Missing:
 
     Attributes
     ----------
-    folder : Path
-        Former folder of the result.
-    run : str
-        The run's key; '' where the file does not have it.
+    folder, run
+        Its former folder, and its run's key; '' where the file does not have that.
     images : tuple of str
         Names of the missing image files.
     gone : bool
@@ -226,12 +223,8 @@ def _set_path(image: bpy.types.Image, path: Path) -> None:
 
 
 def _owners() -> Iterable[bpy.types.ID]:
-    return [
-        owner
-        for data_blocks in (bpy.data.objects, bpy.data.collections)
-        for owner in data_blocks
-        if owner.get(RESULT) and not owner.library
-    ]
+    owners = (*bpy.data.objects, *bpy.data.collections)
+    return [owner for owner in owners if owner.get(RESULT) and not owner.library]
 
 
 def _keeps_images(folder: Path, lost: Missing) -> bool:
@@ -244,9 +237,5 @@ def _keeps_images(folder: Path, lost: Missing) -> bool:
 def _may_be_result(place: Path, folder: Path) -> bool:
     """Whether a result of unknown run may be that of `folder`: it has all of its objects."""
     result = file.read(place)
-    object_ids = set()
-    for obj in bpy.data.objects:
-        with suppress(TypeError):
-            if Path(obj.get(RESULT, "")) == folder:
-                object_ids.add(obj.get(OBJECT_ID))
+    object_ids = {obj.get(OBJECT_ID) for obj in bpy.data.objects if Path(str(obj.get(RESULT, ""))) == folder}
     return result is not None and not result.run and object_ids <= set(result.objects)

@@ -38,12 +38,7 @@ BAKED = (BASE_COLOR, ALBEDO, SHADING)
 def load_baked(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
     """Load the baked images (`BAKED`), replacing those of an earlier call; returns the one for Base Color.
 
-    Raises
-    ------
-    BadInputError
-        An image is damaged, or `where` is `FOLDER` and the file was never saved.
-    StorageError
-        They can't be copied.
+    Raises as `image` and `settle`.
     """
     folder = Path(folder).absolute()
     images = {name: image(folder, name, where) for name in BAKED if (folder / name).exists()}
@@ -141,10 +136,7 @@ def keep(saved: Path) -> None:
     They are hard links to the result's own files, so they take no space until a run rewrites those; copies where the
     file system has no hard links. An image for which that fails keeps its path.
 
-    Parameters
-    ----------
-    saved : Path
-        Path of the file. A result's own scene.blend is overwritten together with its images and refers to those.
+    `saved` is the file's path: a result's own scene.blend is overwritten together with its images and refers to those.
     """
     for image in result_images():
         source = Path(image[IMAGE])
@@ -186,11 +178,8 @@ def kept_path(source: Path, layout: str) -> Path:
 
 def result_images() -> list[bpy.types.Image]:
     """The open file's local images that came from a result."""
-    return [
-        image
-        for image in bpy.data.images
-        if image.get(IMAGE) and not image.library and image.source in ("FILE", "TILED")
-    ]
+    local = (image for image in bpy.data.images if image.get(IMAGE) and not image.library)
+    return [image for image in local if image.source in ("FILE", "TILED")]
 
 
 def path_of(image: bpy.types.Image) -> Path:

@@ -107,20 +107,10 @@ def result_of(scene: bpy.types.Scene) -> Path | None:
 
 
 def set_look(scene: bpy.types.Scene, look: str) -> None:
-    """Show a look in the viewport on all recovered objects, each from its own result.
+    """Show one of `LOOKS` in the viewport on all recovered objects, each from its own result.
 
-    Objects of another run than the one in their folder are left out: the images would not match them.
-
-    Parameters
-    ----------
-    look : str
-        One of `LOOKS`.
-
-    Raises
-    ------
-    BadInputError
-        No object's run is the one in its folder, or an image is missing or damaged; the look
-        stays as it was.
+    Objects of another run than the one in their folder are left out: the images would not match them. Raises
+    `BadInputError`: no object's run is the one in its folder, or an image is missing or damaged; the look stays then.
     """
     if look == MATERIAL:
         _remove_modifiers(scene.objects)
@@ -135,11 +125,12 @@ def set_look(scene: bpy.types.Scene, look: str) -> None:
             "The result folder holds no images of the run that this scene's objects came from; run "
             "again and bring in the result."
         )
-    for folder in dict.fromkeys(folders.values()):
-        if not (folder / LOOKS[look].file).is_file():
-            raise BadInputError(f"'{folder / LOOKS[look].file}' is missing; run the recovery again to its end.")
+    distinct = dict.fromkeys(folders.values())
+    for path in (folder / LOOKS[look].file for folder in distinct):
+        if not path.is_file():
+            raise BadInputError(f"'{path}' is missing; run the recovery again to its end.")
     try:
-        groups = {folder: _group(_material(scene, look, folder), look) for folder in dict.fromkeys(folders.values())}
+        groups = {folder: _group(_material(scene, look, folder), look) for folder in distinct}
     except BadInputError:
         _remove_unused()
         raise

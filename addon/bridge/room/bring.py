@@ -181,13 +181,7 @@ def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, li
 
 
 def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.types.Scene | None = None) -> None:
-    """Show a room in another scene as well.
-
-    Parameters
-    ----------
-    outside : bpy.types.Scene, optional
-        Give `scene` the world and the exposure of this one, too.
-    """
+    """Show a room in another scene as well; with `outside` it gets that scene's world and exposure, too."""
     if top not in scene.collection.children_recursive:
         scene.collection.children.link(top)
         hide_cameras(scene, top)

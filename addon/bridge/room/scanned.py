@@ -20,13 +20,8 @@ from .update import note_known
 def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generator[float, None, ImportedRoom]:
     """Bring a capture into the open file in slices of an object or camera each; yields the share done.
 
-    A later run finds the room and updates it. Nothing that was in the file changes before the last slice.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene, optional
-        Link it into this scene; by default it has one of its own. A room of the capture that the file has already
-        stays as it is, and only comes into the scene.
+    It is linked into `scene`; by default it has one of its own. A later run finds the room and updates it. Nothing that
+    was in the file changes before the last slice: a room of the capture that it has already only comes into the scene.
     """
     top = find_room(capture.root)
     if top is not None:
