@@ -248,17 +248,10 @@ def folder_for(objects: Iterable[bpy.types.Object]) -> Path:
 
 def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
     """`keep` before a capture is run into `folder`, which may be another one than the scene's room came from."""
-    room = {
-        obj
-        for collection in bpy.data.collections
-        if collection.get(CAPTURE) == str(capture)
-        for obj in collection.all_objects
-    }
-    objects = [
-        obj
-        for obj in look.recovered(scene)
-        if result_folder(obj) == folder or obj.get(CAPTURE) == str(capture) or obj in room
-    ]
+    rooms = [collection for collection in bpy.data.collections if collection.get(CAPTURE) == str(capture)]
+    room = {obj for collection in rooms for obj in collection.all_objects}
+    room |= {obj for obj in scene.objects if obj.get(CAPTURE) == str(capture)}
+    objects = [obj for obj in look.recovered(scene) if obj in room or result_folder(obj) == folder]
     if any(key.startswith((GIVEN, WHITE)) for obj in objects for key in obj.keys()) or _written.get(folder):
         if not folder.exists():
             folder.mkdir(parents=True)

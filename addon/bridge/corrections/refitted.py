@@ -67,7 +67,8 @@ def bringing(
     Only materials that the refit changed are made anew, so that what an artist did to others by hand stays. `folder`
     and `before` are what `words` gave, `after` what `fitted` gave.
     """
-    objects = [obj for obj in scene.objects if _wears_some(obj) and corrections.result_folder(obj) == folder]
+    recovered = (obj for obj in scene.objects if any(corrections.correctable(obj, i) for i in slots_of(obj)))
+    objects = [obj for obj in recovered if corrections.result_folder(obj) == folder]
     image = _renew_images(folder)
     run, warnings, edited = after.run, [], []
     for done, obj in enumerate(objects):
@@ -92,10 +93,6 @@ def bringing(
             set_run(collection, folder, run)
             changes.store_findings(collection, changes.read_findings(folder))
     return (*warnings, *sentences((edited, "the material was edited by hand and stays")))
-
-
-def _wears_some(obj: bpy.types.Object) -> bool:
-    return any(corrections.correctable(obj, object_id) for object_id in slots_of(obj))
 
 
 def _dress(obj: bpy.types.Object, object_id: int, entry: dict, image: bpy.types.Image | None) -> None:

@@ -15,10 +15,9 @@ def smooth(objects: Iterable[bpy.types.Object], angle: float) -> int:
     """
     changed = set()
     for obj in objects:
+        obj.pop(SMOOTH, None)
         if angle > 0:
             obj[SMOOTH] = float(angle)
-        elif SMOOTH in obj:
-            del obj[SMOOTH]
         if obj.data not in changed:
             shade(obj.data, angle)
             changed.add(obj.data)

@@ -267,8 +267,7 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
     track.name, track.data = TRACK, cameras[0].data.copy()
     track.data.name = TRACK
     for name in ("frame_path", "frame_exposure", TURNED):
-        if name in track:
-            del track[name]
+        track.pop(name, None)
     track[FRAME_INDEX] = NO_FRAME
     track.rotation_mode = "QUATERNION"
     previous = None

@@ -3,7 +3,7 @@
 import bpy
 
 from ...core.brdf.material import ObjectMaterial
-from ...core.brdf.model import Brdf
+from ...core.brdf.model import Brdf, Principled
 from ...core.brdf.registry import find
 from ..custom_properties import UV_MAP
 from .mesh_objects import ATLAS_UV
@@ -63,20 +63,10 @@ def dress(
 ) -> bpy.types.Material:
     """`make_material` in an existing material: its nodes are replaced, its name and users stay."""
     values = description.model.principled(description)
-    shader = _fresh_principled(material)
-    inputs = shader.inputs
+    shader = _fresh_principled(material, values, base_color if values.base_color is None else None)
     shader.distribution = "GGX"  # the fitted lobe is single scattering
-    _set(inputs, METALLIC, values.metallic, ALPHA, values.alpha, SPECULAR_LEVEL, values.specular_level, IOR, values.ior)
-    _set(inputs, ROUGHNESS, values.roughness, BASE_COLOR, (*(values.base_color or (0.5,) * 3), 1))
-    for name, number in values.further.items():
-        if name in inputs:
-            inputs[name].default_value = number
-    if values.base_color is None and base_color is not None:
-        _show_image(base_color, inputs[BASE_COLOR])
-    if values.emission is not None:
-        _emit(inputs, values.emission)
-        if one_sided:
-            _front_only(inputs[EMISSION_COLOR])
+    if values.emission is not None and one_sided:
+        _front_only(shader.inputs[EMISSION_COLOR])
     _connect(shader)
     material[MODEL] = description.model.name
     properties = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
@@ -127,27 +117,10 @@ def opacity(material: bpy.types.Material) -> float:
     return 1.0 if shader is None else shader.inputs[ALPHA].default_value
 
 
-def plain_material(
-    name: str,
-    colour: tuple[float, float, float] = (0.5, 0.5, 0.5),
-    roughness: float = 0.5,
-    specular: float = 0.5,
-    metallic: float = 0.0,
-    ior: float = 1.5,
-    emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    base_color: bpy.types.Image | None = None,
-    alpha: float = 1.0,
-) -> bpy.types.Material:
-    """A Principled material of plain numbers, linear Rec.709, and at most a picture, which any program understands."""
+def plain_material(name: str, values: Principled, base_color: bpy.types.Image | None = None) -> bpy.types.Material:
+    """A Principled material of plain numbers and at most a picture, which any program understands."""
     material = bpy.data.materials.new(name)
-    shader = _fresh_principled(material)
-    inputs = shader.inputs
-    _set(inputs, BASE_COLOR, (*colour, 1), ROUGHNESS, roughness, METALLIC, metallic, ALPHA, alpha)
-    _set(inputs, SPECULAR_LEVEL, specular, IOR, ior)
-    _emit(inputs, emission)
-    if base_color is not None:
-        _show_image(base_color, inputs[BASE_COLOR])
-    _connect(shader)
+    _connect(_fresh_principled(material, values, base_color))
     return material
 
 
@@ -164,10 +137,6 @@ def _front_only(socket) -> None:
     geometry = add_node(tree, "ShaderNodeNewGeometry", location=(-450, -350))
     front = tuple(socket.default_value)
     feed(socket, mix_node(tree, geometry.outputs["Backfacing"], front, (0, 0, 0, 1), location=(-250, -300)))
-
-
-def _show_image(image, socket) -> None:
-    feed(socket, texture(socket.id_data, image, image.get(UV_MAP, ATLAS_UV)))
 
 
 def texture(tree: bpy.types.NodeTree, image: bpy.types.Image, uv_map: str, **settings) -> bpy.types.NodeSocket:
@@ -190,6 +159,19 @@ def _set(inputs, *names_and_values) -> None:
         feed(inputs[name], value)
 
 
-def _fresh_principled(material: bpy.types.Material) -> bpy.types.ShaderNode:
+def _fresh_principled(
+    material: bpy.types.Material, values: Principled, base_color: bpy.types.Image | None
+) -> bpy.types.ShaderNode:
     """The Principled node of an otherwise empty tree, shown by nothing yet (`_connect`)."""
-    return add_node(fresh_tree(material), "ShaderNodeBsdfPrincipled")
+    shader = add_node(fresh_tree(material), "ShaderNodeBsdfPrincipled")
+    inputs = shader.inputs
+    _set(inputs, METALLIC, values.metallic, ALPHA, values.alpha, SPECULAR_LEVEL, values.specular_level, IOR, values.ior)
+    _set(inputs, ROUGHNESS, values.roughness, BASE_COLOR, (*(values.base_color or (0.5,) * 3), 1))
+    for name, number in values.further.items():
+        if name in inputs:
+            inputs[name].default_value = number
+    if base_color is not None:
+        feed(inputs[BASE_COLOR], texture(shader.id_data, base_color, base_color.get(UV_MAP, ATLAS_UV)))
+    if values.emission is not None:
+        _emit(inputs, values.emission)
+    return shader

@@ -51,8 +51,6 @@ def each_object(
     ----------
     mesh : Mesh
         World positions in metres.
-    instances : iterable of Instance
-        One without triangles gets no object.
     atlas_uv : (t, 3, 2) float32
         Atlas coordinates of each triangle's corners, in [0, 1].
     parts_uv : (t, 3, 2) float32, optional

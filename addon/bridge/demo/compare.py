@@ -44,11 +44,10 @@ def comparison(capture: Path, result: Path) -> str:
 
 def base_color(parts: list[dict]) -> np.ndarray:
     """Mean base colour of an object's parts, entries of materials.json, over what the frames see of them."""
-    materials = [from_json(part) for part in parts]
-    colours = [
-        material.model.base_color(np.float32([part["evidence"]["albedo"]]), material)[0]
-        for part, material in zip(parts, materials)
-    ]
+    colours = []
+    for part in parts:
+        material = from_json(part)
+        colours.append(material.model.base_color(np.float32([part["evidence"]["albedo"]]), material)[0])
     seen = [part["evidence"]["area"] * part["evidence"]["seen_share"] for part in parts]
     return np.average(colours, axis=0, weights=seen if any(seen) else None)
 
@@ -76,11 +75,8 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
             facing = (ray * normals).sum(1) > VISIBILITY.min_cosine * distance
             inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(1) & (depth > 0)
             indices = np.flatnonzero(facing & inside & ~visible)
-            visible[indices] = ~scene.occluded(
-                points[indices].astype(np.float32),
-                (ray[indices] / distance[indices, None]).astype(np.float32),
-                distance[indices].astype(np.float32),
-            )
+            rays = points[indices], ray[indices] / distance[indices, None], distance[indices]
+            visible[indices] = ~scene.occluded(*(values.astype(np.float32) for values in rays))
         weight = share.ravel() * visible
         means[obj.object_id] = weight @ colours.reshape(-1, 3) / weight.sum() if visible.any() else np.full(3, np.nan)
     return means

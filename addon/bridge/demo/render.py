@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.brdf.compensation import ior_of
+from ...core.brdf.model import Principled
 from ...core.io.exr import read_header
 from ...core.kinds import Workload
 from ...core.progress import Progress
@@ -123,13 +124,9 @@ def material(name: str, paint: Paint):
     """The paint as a Cycles material: emission, or a Principled."""
     if not paint.emission:
         plain = paint.albedo.ndim == 1
-        result = plain_material(
-            name,
-            tuple(paint.albedo.tolist()) if plain else (0.5, 0.5, 0.5),
-            paint.roughness,
-            0.5 if paint.f0 else 0.0,
-            ior=ior_of(paint.f0) if paint.f0 else 1.5,
-        )
+        lobe = {"ior": ior_of(paint.f0), "specular_level": 0.5} if paint.f0 else {}
+        colour = tuple(paint.albedo.tolist()) if plain else None
+        result = plain_material(name, Principled(colour, paint.roughness, **lobe))
         principled(result).distribution = "GGX"
         if not plain:
             picture = array_image(name, paint.albedo)

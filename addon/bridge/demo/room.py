@@ -25,10 +25,8 @@ class Paint:
     ----------
     albedo : (3,) or (height, width, 3) float32
         Base colour, one or a picture whose row 0 is the bottom.
-    roughness : float
-        Blender's, the square root of GGX alpha.
-    f0 : float
-        Reflectance at normal incidence; 0 is purely diffuse.
+    roughness, f0 : float
+        Blender's, the square root of GGX alpha; reflectance at normal incidence, 0 is purely diffuse.
     emission : (3,) tuple of float or None
         Radiance of a lamp.
     """

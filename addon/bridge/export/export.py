@@ -76,11 +76,8 @@ def export(
     objects = chosen(scene, scope)
     if not objects:
         raise BadInputError("There is nothing to export: no visible mesh among what was chosen.")
-    extra = [
-        obj
-        for obj in scene.objects
-        if not obj.hide_render and (lights and obj.type == "LIGHT" or cameras and obj == scene.camera)
-    ]
+    visible = (obj for obj in scene.objects if not obj.hide_render)
+    extra = [obj for obj in visible if lights and obj.type == "LIGHT" or cameras and obj == scene.camera]
     with tempfile.TemporaryDirectory(prefix="scan_relight_", ignore_cleanup_errors=True) as folder:
         staging = Path(folder, "made")
         staging.mkdir()

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ...core.brdf.compensation import ior_of
+from ...core.brdf.model import Principled
 from ...core.io.png import write_png
 from ...core.kinds import Code
 from ...core.photo import encoded
@@ -60,7 +61,7 @@ def plain_copy(
     """
     shader = principled(material)
     if shader is None:
-        return plain_material(material.name)
+        return plain_material(material.name, Principled(specular_level=0.5))
     inputs = shader.inputs
     node = image_node(inputs[BASE_COLOR])
     image = node.image if node else None
@@ -70,17 +71,11 @@ def plain_copy(
     elif specular == 0.5:
         # Blender's glTF exporter writes an index of refraction only beside a specular factor that is not 1.
         specular = 0.49999
-    copy = plain_material(
-        material.name,
-        tuple(inputs[BASE_COLOR].default_value[:3]),
-        inputs[ROUGHNESS].default_value,
-        specular,
-        inputs[METALLIC].default_value,
-        ior,
-        emission(material),
-        None if image is None else _picture(*_one_tile(image, tiles), textures, pictures),
-        inputs[ALPHA].default_value,
-    )
+    colour = tuple(inputs[BASE_COLOR].default_value[:3])
+    roughness, metallic, alpha = (inputs[name].default_value for name in (ROUGHNESS, METALLIC, ALPHA))
+    values = Principled(colour, roughness, metallic, ior, specular, alpha, emission(material))
+    picture = None if image is None else _picture(*_one_tile(image, tiles), textures, pictures)
+    copy = plain_material(material.name, values, picture)
     copy.use_backface_culling = bool(inputs[EMISSION_COLOR].links) and lamps.is_lamp(material)
     return copy
 

@@ -12,7 +12,7 @@ import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ...core.errors import EXIT_INTERRUPTED, EXIT_OK, StorageError
 from ...core.kinds import Shown
@@ -41,17 +41,12 @@ class Job:
     ----------
     state : str
         `RUNNING`, `STOPPED`, `DONE` or `FAILED`.
-    stage : str
-        Name of the stage that is worked at; '' before the first.
-    share, overall : float
-        Of the stage and of the whole, 0...1.
-    warnings : list of str
+    stage, share, overall
+        Name of the stage that is worked at ('' before the first); how much of it and of the whole is done, 0...1.
     sentence : str
         Why it ended without being done; '' else.
-    answer : dict
-        What the command said at its end.
-    text : str
-        Everything else that it wrote to standard output.
+    answer, text
+        What the command said at its end, and everything else that it wrote to standard output.
     """
 
     def __init__(self, command: Sequence[str], **facts: object):
@@ -83,13 +78,8 @@ class Job:
             self._folder.close()
             raise StorageError(f"The run can't be started ({error.strerror or error}); start Blender anew.") from error
         _alive.add(self)
-        self._readers = [
-            threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
-            for name, target in (("output", self._read), ("errors", self._read_errors))
-        ]
-        for reader in self._readers:
-            reader.start()
-        threading.Thread(target=self._wait, name="scan relight end", daemon=True).start()
+        self._readers = [_start(self._read, "output"), _start(self._read_errors, "errors")]
+        _start(self._wait, "end")
 
     @property
     def running(self) -> bool:
@@ -116,7 +106,7 @@ class Job:
         if not self.running or self._stop_requested_at is not None:
             return
         self._stop_requested_at = time.monotonic()
-        threading.Thread(target=self._end, name="scan relight stop", daemon=True).start()
+        _start(self._end, "stop")
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait for the end; returns whether it came in time."""
@@ -189,6 +179,12 @@ class Job:
             )
         last_line = next((line for line in reversed(self._errors) if line.strip()), "it left no word")
         return f"The run ended with code {code}: {last_line[:300]}"
+
+
+def _start(target: Callable[[], None], name: str) -> threading.Thread:
+    thread = threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
+    thread.start()
+    return thread
 
 
 _alive: set[Job] = set()

@@ -42,14 +42,11 @@ def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
     """The lamps that match a name: that very material, or all of that class; raises `BadInputError` without any."""
     lamps = find_lamps(scene)
     query = name.strip().casefold()
-    matches = [m for m in lamps if m.name.casefold() == query] or [
-        m for m in lamps if numbered(m.name.casefold())[0] == query
-    ]
+    matches = [m for m in lamps if m.name.casefold() == query]
+    matches = matches or [m for m in lamps if numbered(m.name.casefold())[0] == query]
     if not matches:
-        names = ", ".join(f"'{m.name}'" for m in lamps)
-        raise BadInputError(
-            f"There is no lamp '{name}'; " + (f"known are {names}." if names else "the scan has no lamp at all.")
-        )
+        known = "known are " + ", ".join(f"'{m.name}'" for m in lamps) if lamps else "the scan has no lamp at all"
+        raise BadInputError(f"There is no lamp '{name}'; {known}.")
     return matches
 
 

@@ -124,9 +124,8 @@ def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Obje
 
 def background(data: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
     """The first background image that has a picture."""
-    return next(
-        (item for item in data.background_images if (item.image if item.source == "IMAGE" else item.clip)), None
-    )
+    items = data.background_images
+    return next((item for item in items if (item.image if item.source == "IMAGE" else item.clip)), None)
 
 
 def views(
@@ -187,10 +186,8 @@ def _view(scene, depsgraph, obj, frame, name) -> View:
     displacement = abs(background_image.scale - 1), *map(abs, background_image.offset), abs(background_image.rotation)
     if max(displacement) > 1e-6 or background_image.use_flip_x or background_image.use_flip_y:
         raise BadInputError(f"The background of camera '{obj.name}' is moved, scaled, turned or flipped; reset it.")
-    path = picture(background_image, frame, obj.name)
-    camera = camera_of(
-        obj.evaluated_get(depsgraph), read_header(path), frame_size(scene, obj), background_image.frame_method
-    )
+    path, evaluated = picture(background_image, frame, obj.name), obj.evaluated_get(depsgraph)
+    camera = camera_of(evaluated, read_header(path), frame_size(scene, obj), background_image.frame_method)
     return View(name, camera, path, {field: float(obj[key]) for key, field in PROPERTIES if key in obj})
 
 

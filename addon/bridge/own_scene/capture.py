@@ -87,10 +87,8 @@ def capture_scene(
 
     Raises
     ------
-    BadInputError
-        No object with faces, no usable picture, or `folder` holds something else.
-    StorageError
-        The folder can't be written.
+    BadInputError, StorageError
+        No object with faces, no usable picture, or `folder` holds something else; it can't be written.
     """
     folder, scene = Path(folder).absolute(), context.scene
     if folder.exists() and not (folder / OBJECTS).is_file() and any(folder.iterdir()):
@@ -209,7 +207,6 @@ def polygons_of(folder: Path | str, mesh: Mesh) -> Polygons | None:
             polygons = Polygons(*(stored[name] for name in Polygons._fields))
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         return None
-    matches = polygons.corner.max(initial=-1) < len(polygons.vertex) and np.array_equal(
-        polygons.vertex[polygons.corner], mesh.triangles
-    )
+    vertex, corner = polygons.vertex, polygons.corner
+    matches = corner.max(initial=-1) < len(vertex) and np.array_equal(vertex[corner], mesh.triangles)
     return polygons if matches else None

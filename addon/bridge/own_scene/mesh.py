@@ -130,9 +130,8 @@ def gather(depsgraph: bpy.types.Depsgraph, objects: Iterable[bpy.types.Object]) 
 
 def same_topology(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces in the same order, wherever their vertices are."""
-    return len(first.vertices) == len(second.vertices) and all(
-        np.array_equal(a, b) for a, b in zip(faces_of(first), faces_of(second))
-    )
+    same_faces = all(np.array_equal(a, b) for a, b in zip(faces_of(first), faces_of(second)))
+    return same_faces and len(first.vertices) == len(second.vertices)
 
 
 def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:

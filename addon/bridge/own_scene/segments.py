@@ -56,10 +56,8 @@ class Segment:
         As displayed to the artist.
     class_name : str
         Shared by the same segments of objects with the same mesh, as they are of one kind.
-    slot : int or None
-        The object's material slot that it is made of; None where it is not told by that.
-    face_set : int or None
-        The face set that it is made of, likewise.
+    slot, face_set : int or None
+        The object's material slot, or the face set, that it is made of; None where it is not told by that.
     part_of : int or None
         `object_id` of the main segment of its object; None for that one.
     """
@@ -111,7 +109,8 @@ def segments_of(
     kind, (labels, keys) = "slot", _by_slot(pieces, obj, own)
     order = _largest_first(pieces, keys)
     if len(order) < 2:
-        kind, (labels, keys) = "face_set", _by_face_set(pieces)
+        kind, keys = "face_set", [piece.face_set for piece in pieces]
+        labels = {key: f"face set {key}" for key in np.unique(np.concatenate(keys)).tolist()}
         order = _largest_first(pieces, keys)
     if len(order) < 2:
         return [Segment(first_id, name, class_name)], [np.zeros(len(piece.slot), np.int32) for piece in pieces]
@@ -139,12 +138,6 @@ def _by_slot(pieces: list[Piece], obj: bpy.types.Object, own: bool) -> tuple[dic
         keys = [keys[0].clip(0, len(materials) - 1)]
     used = np.unique(np.concatenate(keys)).tolist()
     return {key: materials[key].name if materials[key] else f"slot {key + 1}" for key in used}, keys
-
-
-def _by_face_set(pieces: list[Piece]) -> tuple[dict[int, str], list[np.ndarray]]:
-    """Label of each face set, and each face's, piece by piece."""
-    keys = [piece.face_set for piece in pieces]
-    return {key: f"face set {key}" for key in np.unique(np.concatenate(keys)).tolist()}, keys
 
 
 def _largest_first(pieces: list[Piece], keys: list[np.ndarray]) -> list[int]:

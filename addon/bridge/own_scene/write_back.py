@@ -69,10 +69,8 @@ def writing_back(
 
     Raises
     ------
-    MissingStageError
-        The capture was not made of a scene.
-    BadInputError
-        An image can't be read, or there is no folder for the images.
+    MissingStageError, BadInputError
+        The capture was not made of a scene; an image can't be read, or there is no folder for the images.
     """
     captured, polygons = sources(capture.root), polygons_of(capture.root, capture.mesh)
     check_own(capture.root)

@@ -6,7 +6,6 @@ In background mode the pictures are rendered here. Beside a window the command l
 
 import os
 import tempfile
-import time
 from pathlib import Path
 
 import bpy
@@ -17,7 +16,7 @@ from ...core.io.folder import MATERIALS, SCENE
 from ...core.progress import Progress
 from ..custom_properties import RESULT
 from ..refused import refused
-from .pictures import check_format, render_to_file, save_side_by_side, seconds_expected, timed_progress
+from .pictures import check_format, render_stage, save_side_by_side
 from .setup import captured_light
 
 NAME = "Before and After"
@@ -32,23 +31,13 @@ def render_pair(scene: bpy.types.Scene, target: Path, progress: Progress | None 
     progress = progress or Progress()
     with refused(f"'{target}' can't be written", "choose another folder"):
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary_folder = tempfile.TemporaryDirectory(
-            prefix=f"{TEMPORARY}{os.getpid()}-", dir=target.parent, ignore_cleanup_errors=True
-        )
+        name = f"{TEMPORARY}{os.getpid()}-"
+        temporary_folder = tempfile.TemporaryDirectory(prefix=name, dir=target.parent, ignore_cleanup_errors=True)
     with temporary_folder as folder:
         before, after = Path(folder, f"before{ending}"), Path(folder, f"after{ending}")
-        progress.stage("before")
         with captured_light(scene):
-            expected = seconds_expected(scene)
-            start = time.monotonic()
-            with timed_progress(progress, expected):
-                render_to_file(scene, before)
-            seconds = time.monotonic() - start
-        progress.done()
-        progress.stage("after")
-        with timed_progress(progress, seconds):
-            render_to_file(scene, after)
-        progress.done()
+            seconds = render_stage(scene, before, progress, "before")
+        render_stage(scene, after, progress, "after", seconds)
         save_side_by_side(before, after, target)
 
 

@@ -16,7 +16,7 @@ from ..light.kelvin import rgb_of
 from ..render_device import use_device
 from .before_after import render_pair
 from .lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
-from .pictures import CYCLES, check_format, prepare, render_to_file, seconds_expected, settings_kept, timed_progress
+from .pictures import CYCLES, check_format, prepare, render_stage, settings_kept
 
 
 @dataclass(frozen=True)
@@ -107,10 +107,7 @@ def relight(
         if before_after:
             render_pair(scene, out, progress)
         else:
-            progress.stage("after")
-            with timed_progress(progress, seconds_expected(scene)):
-                render_to_file(scene, out)
-            progress.done()
+            render_stage(scene, out, progress, "after")
     return remarks
 
 

@@ -46,8 +46,7 @@ def _set(scene: bpy.types.Scene, stops: float) -> None:
 def restore(scene: bpy.types.Scene) -> None:
     """The exposure as it was before `expose`."""
     if CAPTURED in scene:
-        scene.view_settings.exposure = scene[CAPTURED]
-        del scene[CAPTURED]
+        scene.view_settings.exposure = scene.pop(CAPTURED)
 
 
 def captured_exposure(scene: bpy.types.Scene) -> float:

@@ -165,8 +165,22 @@ def seconds_expected(scene: bpy.types.Scene) -> float:
     return seconds[1] + (samples - 1) * max(seconds[0] - seconds[1], 0.0) / (few_samples - 1)
 
 
+def render_stage(
+    scene: bpy.types.Scene, path: Path, progress: Progress, stage: str, expected: float | None = None
+) -> float:
+    """Render to a file as a stage that takes about `expected` seconds, by default measured; returns its seconds."""
+    progress.stage(stage)
+    expected = seconds_expected(scene) if expected is None else expected
+    start = time.monotonic()
+    with _timed_progress(progress, expected):
+        render_to_file(scene, path)
+    seconds = time.monotonic() - start
+    progress.done()
+    return seconds
+
+
 @contextmanager
-def timed_progress(progress: Progress, expected: float) -> Iterator[None]:
+def _timed_progress(progress: Progress, expected: float) -> Iterator[None]:
     """While a picture is rendered within, report progress by the clock; `expected` seconds, 0: no reports."""
     finished, start = threading.Event(), time.monotonic()
 

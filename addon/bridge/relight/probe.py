@@ -69,10 +69,8 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     if bpy.app.background:  # where a graphics card may be missing, which baking does not report
         _try_eevee(scene)
     obj = add_volume(scene)
-    _set_supported(
-        scene.eevee, use_raytracing=True, use_shadows=True, light_threshold=0.001, gi_irradiance_pool_size="64"
-    )
-    _set_supported(scene.eevee, clamp_surface_direct=0.0, clamp_surface_indirect=0.0)
+    _set_supported(scene.eevee, use_raytracing=True, use_shadows=True, light_threshold=0.001)
+    _set_supported(scene.eevee, gi_irradiance_pool_size="64", clamp_surface_direct=0.0, clamp_surface_indirect=0.0)
     for material in {slot.material for item in room_objects(scene) for slot in item.material_slots if slot.material}:
         # Samples behind a wall then count as inside it: they give the wall neither darkness nor the sun outside.
         material.use_backface_culling_lightprobe_volume = True

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ...core.brdf.model import Principled
 from ...core.errors import BadInputError
 from ..data.added import own_collection
 from ..data.arrays import vertices_of
@@ -19,13 +20,12 @@ KIND = "scan_relight_virtual"
 """Custom property of an object that was placed in the room."""
 COLLECTION = "Virtual Objects"
 SPHERE, CUBE, MONKEY = "SPHERE", "CUBE", "MONKEY"
-SHAPES = (SPHERE, CUBE, MONKEY)
 NAMES = {SPHERE: "Sphere", CUBE: "Cube", MONKEY: "Suzanne"}
 OWN, MATTE, GLOSSY, MIRROR = "OWN", "MATTE", "GLOSSY", "MIRROR"
 LOOKS = {
-    MATTE: {"colour": (0.5, 0.5, 0.5), "roughness": 1.0, "specular": 0.0},
-    GLOSSY: {"colour": (0.35, 0.02, 0.015), "roughness": 0.15, "specular": 0.5},
-    MIRROR: {"colour": (0.95, 0.95, 0.95), "roughness": 0.0, "specular": 0.5, "metallic": 1.0},
+    MATTE: Principled((0.5, 0.5, 0.5), 1.0),
+    GLOSSY: Principled((0.35, 0.02, 0.015), 0.15, specular_level=0.5),
+    MIRROR: Principled((0.95, 0.95, 0.95), 0.0, metallic=1.0, specular_level=0.5),
 }
 _MIN_NORMAL_Z = 0.5
 """Minimum z of the normal of a surface that an object can stand on."""
@@ -43,7 +43,7 @@ def add_virtual(
     Parameters
     ----------
     shape, look : str
-        One of `SHAPES`, and of `LOOKS`.
+        One of `NAMES`, and of `LOOKS`.
     size : float
         Largest extent in metres.
     """
@@ -78,7 +78,7 @@ def set_look(obj: bpy.types.Object, look: str) -> None:
     if look == OWN:
         return
     name = f"Scan Relight {look.lower()}"
-    material = bpy.data.materials.get(name) or plain_material(name, **LOOKS[look])
+    material = bpy.data.materials.get(name) or plain_material(name, LOOKS[look])
     obj.data.materials.clear()
     obj.data.materials.append(material)
 

@@ -105,12 +105,11 @@ def result_state(obj: bpy.types.Object | None) -> tuple[str, Result | None]:
 
 def rows_of_parts(objects: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[int, dict[str, Any]]]:
     """The entries in materials.json of each object's instances, where its run is the one in its folder."""
-    found = {
-        obj: {i: result.objects[i] for i in slots_of(obj) if i in result.objects}
-        for obj, (state, result) in result_states(objects).items()
-        if state == FITS
-    }
-    return {obj: parts for obj, parts in found.items() if parts}
+    found = {}
+    for obj, (state, result) in result_states(objects).items():
+        if state == FITS and (parts := {i: result.objects[i] for i in slots_of(obj) if i in result.objects}):
+            found[obj] = parts
+    return found
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

@@ -143,22 +143,18 @@ def search(results_root: Path) -> list[str]:
                     f"file's own {verb} gone; save the file to keep it so."
                 )
             continue
-        file_folders = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
-        candidates = [
-            *file_folders,
-            *(folder / part / lost.folder.name for folder in file_folders for part in ("", FOLDER_BESIDE)),
-            results_root / lost.folder.name,
-        ]
-        new = next(
-            (place for place in candidates if lost.run and run_of(place) == lost.run or _keeps_images(place, lost)),
-            None,
-        )
-        if new is not None:
-            repoint(lost.folder, new)
-            messages.append(
-                f"The result '{lost.folder.name}' was moved and is found again in '{display_path(new)}'; save the file "
-                "to keep it so."
-            )
+        name, candidates = lost.folder.name, []
+        if bpy.data.filepath:
+            beside = Path(bpy.data.filepath).parent
+            candidates = [beside, beside / name, beside / FOLDER_BESIDE / name]
+        for place in (*candidates, results_root / name):
+            if lost.run and run_of(place) == lost.run or _keeps_images(place, lost):
+                repoint(lost.folder, place)
+                messages.append(
+                    f"The result '{name}' was moved and is found again in '{display_path(place)}'; save the file to "
+                    "keep it so."
+                )
+                break
     forget()
     return messages
 

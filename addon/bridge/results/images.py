@@ -88,10 +88,8 @@ def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
 
     Raises
     ------
-    BadInputError
-        `where` is `FOLDER` and the file was never saved, or an image's file is missing.
-    StorageError
-        They can't be copied.
+    BadInputError, StorageError
+        `where` is `FOLDER` and the file was never saved, or an image's file is missing; they can't be copied.
     """
     check(where)
     targets = {}

@@ -93,11 +93,8 @@ def current(scene: bpy.types.Scene) -> str:
 
 def recovered(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The objects with recovered materials."""
-    return [
-        obj
-        for obj in scene.objects
-        if obj.type == "MESH" and OBJECT_ID in obj and ATLAS_UV in obj.data.uv_layers and not obj.library
-    ]
+    of_captures = (obj for obj in scene.objects if obj.type == "MESH" and OBJECT_ID in obj)
+    return [obj for obj in of_captures if ATLAS_UV in obj.data.uv_layers and not obj.library]
 
 
 def result_of(scene: bpy.types.Scene) -> Path | None:

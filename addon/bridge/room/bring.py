@@ -62,10 +62,8 @@ def bringing(
     ------
     MissingStageError
         The folder holds no finished result; with `known`, the file holds no room of that capture.
-    BadInputError
-        scene.blend is damaged, or `where` is a folder beside a file that was never saved.
-    StorageError
-        Images can't be copied.
+    BadInputError, StorageError
+        scene.blend is damaged, or `where` is a folder beside a file that was never saved; images can't be copied.
     """
     folder = Path(folder).absolute()
     root = root_of(folder)
@@ -165,10 +163,8 @@ def _replace_images(added: AddedData, top: bpy.types.Collection) -> None:
 
 def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, list[str]]:
     """Put the room into `scene`, or one of its own; returns the scene that shows it, and what stays the artist's."""
-    messages: list[str] = []
     room_scene = None if new else own_scene(top)
-    if room_scene is not None:
-        messages = take_settings(room_scene, shell)
+    messages = [] if room_scene is None else take_settings(room_scene, shell)
     if scene is not None:
         link_room(top, scene)
     if scene is None and room_scene is None:

@@ -74,13 +74,8 @@ def objects_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
     captures = {obj[CAPTURE] for obj in bpy.data.objects if CAPTURE in obj}
     same_capture = {name for name in captures if Path(name).resolve() == root}
     collected = {obj for obj in top.all_objects if OBJECT_ID in obj or "pixel_aspect" in obj}
-    return [
-        obj
-        for obj in bpy.data.objects
-        if not obj.library
-        and obj.users_collection
-        and (obj[CAPTURE] in same_capture if CAPTURE in obj else obj in collected)
-    ]
+    local = (obj for obj in bpy.data.objects if not obj.library and obj.users_collection)
+    return [obj for obj in local if (obj[CAPTURE] in same_capture if CAPTURE in obj else obj in collected)]
 
 
 def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[float, None, Steps]:

@@ -99,8 +99,7 @@ def our_own(owner: bpy.types.Material | bpy.types.World) -> Iterator[None]:
     noted = WRITTEN in owner and not is_corrected(owner)
     yield
     if noted:
-        del owner[WRITTEN]
-        stamp_tree(owner)
+        stamp_tree(owner, anew=True)
 
 
 def is_ours(material: bpy.types.Material | None) -> bool:

@@ -86,8 +86,12 @@ def _build(
     scene.world = make_world("Scan Relight", images.get(ENVIRONMENT))
     stamp_tree(scene.world)
     _prepare(scene, median_radiance)
-    first = cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, camera_collection)
-    use_camera(scene, first)
+    if cameras:
+        use_camera(scene, cameras[best_view(capture.frames, capture.mesh)])
+    else:
+        from ...core.scene.overview import overview  # not earlier: Blender's start should not wait for embreex
+
+        use_camera(scene, make_view("overview", overview(capture.mesh), camera_collection))
     scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
     scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
     scene[EXPOSURE] = scene.view_settings.exposure
@@ -128,12 +132,6 @@ def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.ty
     return panels
 
 
-def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
-    from ...core.scene.overview import overview  # not earlier: Blender's start should not wait for embreex
-
-    return make_view("overview", overview(capture.mesh), collection)
-
-
 def write_scene(
     path: Path | str,
     capture: Capture,
@@ -150,16 +148,14 @@ def write_scene(
 
     Parameters
     ----------
-    path : Path or str
-        Best within `result_folder`, so that both are moved together.
+    path, result_folder : Path or str
+        The folder holds the images (`BASE_COLOR` and its neighbours); `path` is best in it: both are moved together.
     capture : Capture
         The mesh's normals face the frames: a lamp that is an open sheet shines on that side only, as it was seen.
     atlas_uv : (t, 3, 2) float32
         What `unwrap` gave.
     materials : iterable of ObjectMaterial
         An instance without one becomes lambertian.
-    result_folder : Path or str
-        Holds the images, see `BASE_COLOR` and its neighbours.
     median_radiance : float
         Of the frames; the exposure is set so that this becomes middle grey. 0: unknown.
     fresh : bool
@@ -175,10 +171,8 @@ def write_scene(
 
     Raises
     ------
-    BadInputError
-        An image of the result folder can't be read.
-    StorageError
-        The file can't be written.
+    BadInputError, StorageError
+        An image of the result folder can't be read; the file can't be written.
     """
     path = Path(path).absolute()
     if fresh:
@@ -193,19 +187,22 @@ def write_scene(
     return warnings
 
 
+def _save(name, scene, images, fresh):
+    if fresh:
+        bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
+    else:
+        # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
+        scene.view_layers[0].update()
+        bpy.data.libraries.write(name, {scene, *images}, path_remap="NONE", compress=True, fake_user=False)
+
+
 def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image], fresh: bool) -> None:
     writing = path.parent / _WRITING
     try:
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             writing.unlink(missing_ok=True)
-            if fresh:
-                bpy.ops.wm.save_as_mainfile(filepath=str(writing), copy=True, compress=True, relative_remap=False)
-            else:
-                # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
-                scene.view_layers[0].update()
-                content = {scene, *images}
-                bpy.data.libraries.write(str(writing), content, path_remap="NONE", compress=True, fake_user=False)
+            _save(str(writing), scene, images, fresh)
             try:  # Blender does not notice a full disk while it compresses, but it does when it reads
                 with bpy.data.libraries.load(str(writing)):
                     pass

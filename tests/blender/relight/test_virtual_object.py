@@ -22,7 +22,7 @@ def points(thing):
     return np.array([thing.matrix_world @ v.co for v in thing.data.vertices])
 
 
-@pytest.mark.parametrize("shape", virtual.SHAPES)
+@pytest.mark.parametrize("shape", virtual.NAMES)
 def test_its_lowest_point_lies_on_the_surface(scene, shape):
     floor = sheet(scene, "floor", 4, (0.3, 0.2, 0.7))
     thing = virtual.add_virtual(scene, shape, 0.4, virtual.GLOSSY, Hit(Vector((0.5, -0.4, 0.7)), UP, 1, floor))
