@@ -153,7 +153,7 @@ def test_before_and_after_puts_every_setting_back(ops, tmp_path, fails, monkeypa
     scene.render.image_settings.file_format = "JPEG"
     scene.render.use_border = True
     before = settings(scene)
-    module = importlib.import_module("scan_relight.addon.bridge.relight.before_after")
+    module = importlib.import_module("scan_relight.addon.bridge.relight.pictures")
     shoot, calls = module.render_to_file, []
 
     def maybe(*arguments):
