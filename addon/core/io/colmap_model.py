@@ -14,6 +14,7 @@ from typing import NamedTuple
 from ..errors import BadInputError
 from ..kinds import Code, Limit
 from ..scene.lenses_colmap import COUNTS, NAMES
+from .files import mapped
 
 MAX_NAME_BYTES: Limit[int] = 4096
 MIN_CAMERA_BYTES: Code[int] = 24 + 2 * 8
@@ -160,7 +161,7 @@ def _name(name: bytes) -> str:
 def _mapped(path: Path) -> Iterator[mmap.mmap]:
     if path.stat().st_size < 8:
         raise BadInputError(f"'{path}' is cut off: it has {path.stat().st_size} bytes; export the model again.")
-    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    with mapped(path) as data:
         yield data
 
 

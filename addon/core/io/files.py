@@ -1,6 +1,7 @@
 """Reading files of a capture safely, and only within its folder unless the user allows more."""
 
 import json
+import mmap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -41,6 +42,13 @@ def read_bytes(path: Path, what: str = "", max_bytes: int = -1) -> bytes:
     """A file's content, or the first `max_bytes` bytes of it; errors name it as `what` 'path'."""
     with readable(f"{what}'{path}'"), open(path, "rb") as file:
         return file.read(max_bytes)
+
+
+@contextmanager
+def mapped(path: Path) -> Iterator[mmap.mmap]:
+    """A file's content, of which only what is looked at is read; raises OSError, and ValueError where it is empty."""
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        yield data
 
 
 def _content(path: Path) -> str:
