@@ -67,11 +67,14 @@ class Faces(NamedTuple):
         The face that each triangle is part of.
     own_vertices : bool
         Whether the mesh has the file's vertices in the file's order.
+    corner : (t, 3) int32 or None
+        Of PLY: which of its face's corners each of a triangle's is.
     """
 
     total: int
     of_triangle: np.ndarray
     own_vertices: bool
+    corner: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import BadInputError
-from .layout import Faces, RawMesh, Reading
-from .ply import PlyMesh, read_ply
+from .layout import RawMesh, Reading
+from .ply import read_ply
 
 IMPORTED = (".obj", ".gltf", ".glb")
 """Endings that `Reading.import_mesh` is asked for."""
@@ -31,14 +29,7 @@ def read_mesh(path: Path, reading: Reading) -> RawMesh:
         return reading.import_mesh(path)
     if ending != ".ply":
         raise BadInputError(f"Mesh '{path}' is of no kind that is known; give a PLY, OBJ, glTF or GLB file.")
-    return mesh_of(read_ply(path), path.name)
-
-
-def mesh_of(ply: PlyMesh, name: str) -> RawMesh:
-    """The mesh of a PLY file that messages call `name`."""
-    one_each = len(ply.face) == ply.faces and np.array_equal(ply.face, np.arange(ply.faces))
-    faces = None if one_each else Faces(ply.faces, ply.face, own_vertices=True)
-    return RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=name, faces=faces)
+    return read_ply(path)
 
 
 def find_mesh(root: Path, reading: Reading, names: Sequence[str] = (MESH,), remedy: str = "") -> Path:

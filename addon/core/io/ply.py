@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..kinds import Limit
 from .files import absence, read_bytes
+from .layout import Faces, RawMesh
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
@@ -48,34 +49,7 @@ class Element:
     properties: list[Property]
 
 
-class PlyMesh(NamedTuple):
-    """What a PLY file holds, unrepaired.
-
-    Attributes
-    ----------
-    vertices : (v, 3) float64
-    triangles : (t, 3) int32
-        In the order of the file's faces; each index is within the vertices.
-    object_id : (t,) int64 or None
-    uv : (t, 3, 2) float32 or None
-    face : (t,) int64
-        The file's face that each triangle is part of.
-    corner : (t, 3) int32
-        Which of that face's corners each of the triangle's is.
-    faces : int
-        Number of the file's faces.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    object_id: np.ndarray | None
-    uv: np.ndarray | None
-    face: np.ndarray
-    corner: np.ndarray
-    faces: int
-
-
-def read_ply(path: Path) -> PlyMesh:
+def read_ply(path: Path) -> RawMesh:
     """Read the mesh `path`.
 
     Polygons become triangles: quads along their shorter diagonal, longer ones as a fan; faces of fewer than 3 corners
@@ -89,7 +63,7 @@ def read_ply(path: Path) -> PlyMesh:
     with _one_sentence(path):
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
-        return _mesh(_records(read_bytes(path, "Mesh ")))
+        return _mesh(_records(read_bytes(path, "Mesh ")), path.name)
 
 
 def read_columns(path: Path, groups: Sequence[tuple[str, ...]]) -> dict[str, np.ndarray | None]:
@@ -139,7 +113,7 @@ def _records(content: bytes) -> dict[str, _Records]:
     return records_of
 
 
-def _mesh(records_of: dict[str, _Records]) -> PlyMesh:
+def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
     if "vertex" not in records_of:
         raise ValueError("holds no vertices")
     place, *pairs = (records_of["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
@@ -148,20 +122,20 @@ def _mesh(records_of: dict[str, _Records]) -> PlyMesh:
     vertices = place.astype(np.float64)
     if "face" not in records_of:
         none = np.zeros((0, 3), np.int32)
-        return PlyMesh(vertices, none, None, None, np.zeros(0, np.int64), none, 0)
+        return RawMesh(vertices, none, name=name, faces=Faces(0, np.zeros(0, np.int64), True, none))
 
     faces = records_of["face"]
-    name = next((n for n in INDEX_NAMES if n in faces.counts), None)
-    if name is None:
+    index = next((n for n in INDEX_NAMES if n in faces.counts), None)
+    if index is None:
         raise ValueError("has faces without vertex_indices")
-    triangles, source, corner = _triangles(faces.counts[name], faces.entries(name), vertices)
+    triangles, source, corner = _triangles(faces.counts[index], faces.entries(index), vertices)
     ids = faces.columns(("object_id",))
     if ids is not None:
         whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
         ids = whole[:, 0].astype(np.int64)[source]
     pair = next((pair for pair in pairs if pair is not None), None)
     uv = None if pair is None else pair.astype(np.float32)[triangles]
-    return PlyMesh(vertices, triangles, ids, uv, source, corner, len(faces.counts[name]))
+    return RawMesh(vertices, triangles, ids, uv, name=name, faces=Faces(len(faces.counts[index]), source, True, corner))
 
 
 def parse_header(content: bytes) -> tuple[str, list[Element], int]:

@@ -21,9 +21,8 @@ from . import nerfstudio, traj
 from .files import read_bytes, read_json
 from .formats import FORMATS
 from .instances import FILE, read_instances
-from .layout import Layout, Reader, Reading, holding
-from .meshes import mesh_of
-from .ply import PlyMesh, read_ply
+from .layout import Layout, RawMesh, Reader, Reading, holding
+from .ply import read_ply
 from .replica_glass import FILE as GLASS
 from .replica_glass import mirrors_of, read_panes
 
@@ -48,11 +47,10 @@ def read(root: Path, reading: Reading) -> Layout:
     """
     if reading.mesh is not None:
         raise BadInputError(f"Capture '{root}' has its light on its own mesh; leave --mesh away.")
-    ply = read_ply(root / MESH)
-    mesh = mesh_of(ply, MESH)
+    mesh = read_ply(root / MESH)
     names, notes, names_file = None, [], NAMES
     if (root / SEMANTIC).is_file():
-        ids, far = _object_id(root / SEMANTIC, ply)
+        ids, far = _object_id(root / SEMANTIC, mesh)
         mesh = replace(mesh, object_id=ids)
         if far:
             notes.append(f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object.")
@@ -75,19 +73,21 @@ def read(root: Path, reading: Reading) -> Layout:
         "The capture has no frames; its light is taken from the textures on its mesh, which hold one value "
         "for all views: highlights can't be told, nor what lies outside."
     )
-    return Layout([], replace(mesh, lit=_tiles(root, ply)), names, names_file, notes=notes, mirrors=mirrors)
+    return Layout([], replace(mesh, lit=_tiles(root, mesh)), names, names_file, notes=notes, mirrors=mirrors)
 
 
-def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
+def _tiles(root: Path, mesh: RawMesh) -> LitTiles:
     """Which tile each triangle shows."""
     split, size = _parameters(root / PARAMETERS)
-    faces = int(ply.face.max(initial=-1)) + 1
-    if len(ply.triangles) != 2 * faces or ply.corner.max(initial=0) > 3:
+    assert mesh.faces is not None and mesh.faces.corner is not None
+    face, corner = mesh.faces.of_triangle, mesh.faces.corner
+    faces = int(face.max(initial=-1)) + 1
+    if len(mesh.triangles) != 2 * faces or corner.max(initial=0) > 3:
         raise BadInputError(
             f"Mesh '{root / MESH}' is not made of quads alone, as its textures need; use the one that came with them."
         )
     quads = np.zeros((faces, 4), np.int64)
-    quads[ply.face[:, None], ply.corner] = ply.triangles
+    quads[face[:, None], corner] = mesh.triangles
     if split > 0 and not (root / ORDER).is_file():
         raise BadInputError(f"'{root / ORDER}' is needed to tell whose texture is whose, but is missing; copy it, too.")
     chunks = _sorted_faces(root / ORDER, faces) if split > 0 else [np.arange(faces)]
@@ -103,7 +103,7 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
             f"'{root / TEXTURES}' has more pictures than the mesh's {len(chunks)} chunks; use the mesh "
             "that came with them."
         )
-    return LitTiles(tuple(paths), tuple(sides), size, picture[ply.face], tile[ply.face], CORNERS[ply.corner])
+    return LitTiles(tuple(paths), tuple(sides), size, picture[face], tile[face], CORNERS[corner])
 
 
 def _sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
@@ -160,7 +160,7 @@ def _side(path: Path, size: int, faces: int, root: Path, i: int) -> int:
     return side
 
 
-def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
+def _object_id(path: Path, mesh: RawMesh) -> tuple[np.ndarray, float]:
     """The object of each triangle ((t,) int64, -1: none), and the share of those without.
 
     The mesh with the objects lists the same faces, but not always in the same order: the nearest one counts.
@@ -168,15 +168,15 @@ def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
     annotated = read_ply(path)
     if annotated.object_id is None:
         raise BadInputError(f"Mesh '{path}' has no object_id on its faces; copy it again.")
-    if not len(annotated.triangles) or not len(ply.triangles):
+    if not len(annotated.triangles) or not len(mesh.triangles):
         raise BadInputError(f"Mesh '{path}' or '{MESH}' has no triangles; copy them again.")
-    centres, annotated_centres = (mesh.vertices[mesh.triangles].mean(1) for mesh in (ply, annotated))
+    centres, annotated_centres = (m.vertices[m.triangles].mean(1) for m in (mesh, annotated))
     if centres.shape == annotated_centres.shape and np.allclose(centres, annotated_centres, atol=1e-4):
         return annotated.object_id, 0.0
     if not (np.isfinite(centres).all() and np.isfinite(annotated_centres).all()):
         raise BadInputError(f"Mesh '{path}' or '{MESH}' has vertices that are not finite; copy them again.")
     distance, nearest = cKDTree(annotated_centres).query(centres)
-    edge = float(np.median(np.linalg.norm(np.diff(ply.vertices[ply.triangles[:, :2]], axis=1), axis=2)))
+    edge = float(np.median(np.linalg.norm(np.diff(mesh.vertices[mesh.triangles[:, :2]], axis=1), axis=2)))
     far = distance > FAR * edge
     return np.where(far, -1, annotated.object_id[nearest]), float(far.mean())
 

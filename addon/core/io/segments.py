@@ -112,10 +112,10 @@ def _by_file(path: Path, mesh: RawMesh) -> np.ndarray:
     if element != "face" and faces.own_vertices and len(ids) == len(mesh.vertices):
         return _of_corners(ids, mesh.triangles)
     if element == "vertex":  # of the same mesh with its vertices listed otherwise: a face has what its own corners have
-        ply = read_ply(path)
-        if ply.faces == faces.total:
-            of_face = np.zeros(ply.faces, np.int64)
-            of_face[ply.face[::-1]] = _of_corners(ids, ply.triangles)[::-1]  # the first triangle's stays
+        own = read_ply(path)
+        if own.faces is not None and own.faces.total == faces.total:
+            of_face = np.zeros(faces.total, np.int64)
+            of_face[own.faces.of_triangle[::-1]] = _of_corners(ids, own.triangles)[::-1]  # the first triangle's stays
             return of_face[faces.of_triangle]
     of = {"face": " of faces", "vertex": " of vertices"}.get(element, "")
     vertices = f" and {len(mesh.vertices)} vertices" if faces.own_vertices else ""
