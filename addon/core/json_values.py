@@ -47,6 +47,14 @@ def is_number(value: Any) -> TypeGuard[float]:
     )
 
 
+def float_of(text: str) -> float:
+    """The number that a text is; NaN where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def numbers(entry: Any, names: Sequence[str]) -> list[float] | None:
     """The finite numbers that a JSON object has under all of `names`; None where one is absent or something else."""
     values = [entry.get(name) for name in names] if isinstance(entry, dict) else [None]

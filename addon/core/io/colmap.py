@@ -18,7 +18,7 @@ from .colmap_model import ColmapImage, ColmapModel, model_files, read_model
 from .files import inside
 from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, usable
-from .meshes import IMPORTED, MESH, find_mesh, read_mesh
+from .meshes import MESH, find_mesh, mesh_files, read_mesh
 
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap/0", "colmap", "dense/sparse")
 """Where in a capture a model may lie."""
@@ -172,8 +172,8 @@ def _pictures(root: Path, model: Path) -> Path:
 
 def _mesh(root: Path, reading: Reading) -> RawMesh:
     cloud = next((place for place in POINTS if (root / place).is_file()), None)
-    others = (p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.name not in POINTS)
-    if reading.mesh is None and cloud and not any((root / place).exists() for place in MESHES) and not any(others):
+    others = any(path.name not in POINTS for path in mesh_files(root))
+    if reading.mesh is None and cloud and not any((root / place).exists() for place in MESHES) and not others:
         raise BadInputError(
             f"Capture '{root}' has no mesh, only the points of '{cloud}'; mesh them (colmap "
             f"poisson_mesher) to '{MESHES[1]}' or name a mesh with --mesh."

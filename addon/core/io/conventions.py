@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Unit
 from ..scene.model import Camera, Frame
 from .layout import RawMesh
@@ -121,7 +122,7 @@ def parse(text: str) -> Convention:
             convention = replace(convention, camera=value) if kind == "camera" else replace(convention, world=value)
         elif kind == "up" and re.fullmatch(r"[+-][xyz]", value):
             convention = replace(convention, up=value)
-        elif kind == "scale" and _positive(value):
+        elif kind == "scale" and 0 < float_of(value) < math.inf:
             convention = replace(convention, scale=float(value))
         else:
             raise BadInputError(
@@ -130,13 +131,6 @@ def parse(text: str) -> Convention:
                 "(axes must make a rotation)."
             )
     return convention
-
-
-def _positive(text: str) -> bool:
-    try:
-        return 0 < float(text) < math.inf
-    except ValueError:
-        return False
 
 
 def alternatives() -> Iterator[Convention]:

@@ -21,8 +21,7 @@ MAX_EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
 
 def check_ids(frame: Frame) -> None:
     """Compare the header of a frame's picture of ids with its camera; raises `BadInputError`."""
-    if frame.id_path is None:
-        return
+    assert frame.id_path is not None
     path, kind = frame.id_path, picture_kind(frame.id_path)
     if kind in (EXR, PNG):  # else told when it is read
         check_size(frame, path, parse_headers(path)[0].size if kind == EXR else picture_size(path))  # of any channel
@@ -39,8 +38,7 @@ def read_ids(frame: Frame) -> np.ndarray:
     BadInputError
         The picture can't be read, or holds no ids.
     """
-    if frame.id_path is None:
-        raise BadInputError(f"Frame '{frame.name}' has no picture of ids; give it one.")
+    assert frame.id_path is not None
     path = frame.id_path
     if picture_kind(path) == EXR:
         return _whole_numbers(read_numbers(path), path)

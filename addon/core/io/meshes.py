@@ -32,6 +32,11 @@ def read_mesh(path: Path, reading: Reading) -> RawMesh:
     return read_ply(path)
 
 
+def mesh_files(root: Path) -> list[Path]:
+    """The files of meshes in a folder, by their names."""
+    return sorted(path for path in root.iterdir() if path.suffix.lower() in (".ply", *IMPORTED) and path.is_file())
+
+
 def find_mesh(root: Path, reading: Reading, names: Sequence[str] = (MESH,), remedy: str = "") -> Path:
     """The mesh that the user named, else the first file of `names`, else the only mesh file of the folder.
 
@@ -50,7 +55,7 @@ def find_mesh(root: Path, reading: Reading, names: Sequence[str] = (MESH,), reme
     for path in (root / name for name in names):
         if path.exists():
             return path
-    paths = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
+    paths = mesh_files(root)
     if len(paths) == 1:
         return paths[0]
     if paths:

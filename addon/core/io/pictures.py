@@ -59,11 +59,8 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
     BadInputError
         The file is absent, damaged, or of a kind that isn't supported.
     """
-    kind = picture_kind(path)
-    if kind in CODED or kind == HEIC:
-        width, height = (heif_header if kind == HEIC else coded_header)(path)[:2]
-    else:
-        width, height = {EXR: read_header, HDR: hdr_size, DNG: raw_size}[kind](path)
+    readers = {EXR: read_header, HDR: hdr_size, DNG: raw_size, HEIC: heif_header}
+    width, height = readers.get(picture_kind(path), coded_header)(path)[:2]
     return (height, width) if turned and picture_orientation(path) > 4 else (width, height)
 
 
@@ -106,12 +103,9 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         return read_exr(path)
     if kind == HDR:
         return read_hdr(path)
-    if kind == DNG:
-        rgb = read_raw(path).rgb
-        return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
     if not transfer and picture_bits(path):
         raise BadInputError(unstated_curve(path))
-    colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
+    colour, alpha, profile = {HEIC: read_heif, DNG: read_raw}.get(kind, read_coded)(path)
     if turned:
         orientation = picture_orientation(path)
         colour, alpha = turn(colour, orientation), None if alpha is None else turn(alpha, orientation)

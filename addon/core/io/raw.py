@@ -15,7 +15,8 @@ from ..errors import BadInputError
 from ..kinds import Code, Limit
 from . import exif
 from .files import read_bytes
-from .picture import Picture, check_claim, decoding
+from .oiio import Stored
+from .picture import check_claim, decoding
 
 DNG = "DNG"
 DNG_VERSION: Code[int] = 50706
@@ -46,7 +47,7 @@ def raw_size(path: Path) -> tuple[int, int]:
         return int(file.sizes.width), int(file.sizes.height)
 
 
-def read_raw(path: Path) -> Picture:
+def read_raw(path: Path) -> Stored:
     """Read the DNG `path` as stored, not turned: 1 is where the sensor clips.
 
     Raises
@@ -68,7 +69,7 @@ def read_raw(path: Path) -> Picture:
         )
         if values.shape != (file.sizes.height, file.sizes.width, 3):
             raise ValueError("other pixels than its header says")
-    return Picture(values.astype(np.float32) / np.float32(MAX_VALUE), None)
+    return Stored(values.astype(np.float32) / np.float32(MAX_VALUE), None)
 
 
 @contextmanager

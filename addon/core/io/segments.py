@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Limit
 from ..scene.model import KnownMirror
 from .files import absence, read_bytes, read_text
@@ -136,15 +137,8 @@ def _from_text(path: Path) -> tuple[str, np.ndarray]:
     try:
         values = np.array(words, np.float64)
     except ValueError:
-        values = np.array([_number(word) for word in words])
+        values = np.array([float_of(word) for word in words])
     return "", _checked(values, path, words)
-
-
-def _number(word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return np.nan
 
 
 def _from_npy(path: Path) -> tuple[str, np.ndarray]:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from . import video
@@ -75,9 +76,9 @@ def _rows(root: Path) -> dict[int, dict[str, float]]:
     head, *lines = _cells(root / POSES) or [[]]
     whole: dict[str, float] = {}
     if not set(LENS) <= set(head) and (root / MATRIX).is_file():
-        matrix = [_number(cell) for line in _cells(root / MATRIX) for cell in line]
+        matrix = [float_of(cell) for line in _cells(root / MATRIX) for cell in line]
         whole = dict(zip(LENS, (matrix[k] for k in (0, 4, 2, 5)))) if len(matrix) == 9 else {}
-    rows = [whole | dict(zip(head, map(_number, line))) for line in lines]
+    rows = [whole | dict(zip(head, map(float_of, line))) for line in lines]
     numbered = ((row.get("frame", float(i)), row) for i, row in enumerate(rows))
     by_number = {int(number): row for number, row in numbered if 0 <= number < MAX_FRAME_NUMBER}
     if not set(POSE) <= set(head) or not by_number:
@@ -87,13 +88,6 @@ def _rows(root: Path) -> dict[int, dict[str, float]]:
 
 def _cells(path: Path) -> list[list[str]]:
     return [[cell.strip() for cell in line.split(",")] for line in read_text(path).splitlines() if line.strip()]
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return np.nan
 
 
 READER = Reader("stray", FORMATS["stray"], holding(POSES, VIDEO), read)

@@ -15,7 +15,7 @@ from ..scene.stored_light import LitTexture
 from .base_colour import as_file, base_colours
 from .formats import FORMATS
 from .layout import Layout, Reader, Reading
-from .meshes import IMPORTED, find_mesh, read_mesh
+from .meshes import IMPORTED, find_mesh, mesh_files, read_mesh
 from .pictures import picture_size
 from .transfer import SRGB
 
@@ -23,7 +23,7 @@ from .transfer import SRGB
 def find(root: Path) -> bool:
     """Whether the folder's only mesh is of a kind that can have a texture, and it is no result that was exported."""
     try:
-        meshes = [path for path in root.iterdir() if path.suffix.lower() in (".ply", *IMPORTED) and path.is_file()]
+        meshes = mesh_files(root)
     except OSError:
         return False
     return len(meshes) == 1 and meshes[0].suffix.lower() in IMPORTED and not (root / "materials.json").exists()

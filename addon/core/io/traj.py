@@ -18,7 +18,7 @@ from .camera_check import pinhole
 from .files import read_json, read_text
 from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, holding, usable
-from .meshes import IMPORTED, find_mesh, read_mesh
+from .meshes import find_mesh, mesh_files, read_mesh
 from .pictures import ENDINGS
 
 POSES, PARAMETERS, FOLDER = "traj.txt", "cam_params.json", "results"
@@ -101,9 +101,8 @@ def _pictures(folder: Path) -> dict[int, Path]:
 
 def _mesh(root: Path, reading: Reading) -> RawMesh:
     """The mesh that is named, or in the folder, or beside it under the folder's name."""
-    meshes = [p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED)]
     beside = root.absolute().parent / f"{root.absolute().name}_mesh.ply"
-    if reading.mesh is None and not meshes and beside.is_file():
+    if reading.mesh is None and not mesh_files(root) and beside.is_file():
         return read_mesh(beside, reading)
     return read_mesh(find_mesh(root, reading), reading)
 

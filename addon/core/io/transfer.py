@@ -10,6 +10,7 @@ import functools
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Code, Limit
 from ..photo import srgb_to_linear
 from ..scene.model import AUTO
@@ -61,10 +62,7 @@ def _table(bits: int, transfer: str) -> np.ndarray:
 def _gamma(text: str) -> float:
     if text in (SRGB, LINEAR):
         return 1.0
-    try:
-        gamma = float(text)
-    except ValueError:
-        gamma = 0.0
+    gamma = float_of(text)
     if not GAMMAS[0] <= gamma <= GAMMAS[1]:
         raise BadInputError(f"There is no curve '{text}' of pictures; give auto, srgb, linear, or a gamma such as 2.2.")
     return gamma

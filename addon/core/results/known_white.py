@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Shown, Unit
 from ..photo import MIDDLE_GREY
 from ..scene.model import Capture
@@ -32,10 +33,7 @@ def white_of(text: str, capture: Capture) -> White:
     """
     subject, _, albedo_text = text.partition("=")
     pixel = PIXEL.fullmatch(subject)
-    try:
-        albedo = float(albedo_text) if albedo_text else MIDDLE_GREY if pixel else WHITE_PAINT
-    except ValueError:
-        albedo = 0.0
+    albedo = float_of(albedo_text) if albedo_text else MIDDLE_GREY if pixel else WHITE_PAINT
     if not 0 < albedo <= 1:
         raise BadInputError(
             f"Albedo '{albedo_text}' of '{subject.strip()}' is no number above 0 and up to 1; give one."
