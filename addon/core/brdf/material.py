@@ -136,10 +136,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
 def from_json(entry: dict[str, Any]) -> ObjectMaterial:
     """A description as materials.json or a stored stage has it; further keys are left out.
 
-    Raises
-    ------
-    BadInputError
-        Its model is of a package that is not there.
+    Raises `BadInputError` where its model is of a package that is not there.
     """
     values: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value

@@ -54,17 +54,12 @@ def read_pose(values: Sequence[Any], name: str) -> np.ndarray:
 
 
 def read_y_up(path: Path, reading: Reading, to_world: np.ndarray | None = None) -> RawMesh:
-    """Read a mesh in ARKit's axes, turned to +Z up.
+    """Read a mesh in ARKit's axes, turned to +Z up. Raises as `meshes.read_mesh`.
 
     Parameters
     ----------
     to_world : (4, 4) float64, optional
         From the mesh's coordinates to those of the poses, before either is turned.
-
-    Raises
-    ------
-    BadInputError
-        As `meshes.read_mesh`.
     """
     mesh = read_mesh(path, reading)
     move = np.eye(4) if to_world is None else to_world

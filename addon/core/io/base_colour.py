@@ -26,10 +26,7 @@ NEW, PICTURE = re.compile(rb"^\s*newmtl\s+(.*\S)\s*$"), re.compile(rb"^\s*map_Kd
 def base_colours(path: Path) -> list[StoredPicture | None]:
     """The picture of each material of the mesh `path`, as `RawMesh.material` counts them; None where it has none.
 
-    Raises
-    ------
-    BadInputError
-        The file is damaged, or names a picture that is not beside it.
+    Raises `BadInputError` where the file is damaged, or names a picture that is not beside it.
     """
     return _of_obj(path) if path.suffix.lower() == ".obj" else _of_gltf(path)
 
@@ -38,10 +35,7 @@ def base_colours(path: Path) -> list[StoredPicture | None]:
 def as_file(picture: StoredPicture) -> Iterator[Path]:
     """A picture as a file of its own, which goes again where it lies within another.
 
-    Raises
-    ------
-    BadInputError
-        The file that holds it was taken away.
+    Raises `BadInputError` where the file that holds it was taken away.
     """
     if not picture.length:
         yield picture.path

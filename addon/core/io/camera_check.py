@@ -26,10 +26,7 @@ MAX_COEFFICIENT: Limit[float] = 1e9
 def pinhole(entry: Any, names: Sequence[str], path: Path) -> Camera:
     """The camera, without a pose, of which a JSON object tells width, height, fx, fy, cx and cy under some `names`.
 
-    Raises
-    ------
-    BadInputError
-        One is missing or can't be; `path` is the file.
+    Raises `BadInputError` where one is missing or can't be; `path` is the file.
     """
     values = numbers(entry, names)
     if values is None or min(values[:4]) <= 0 or any(value != int(value) for value in values[:2]):
@@ -42,13 +39,7 @@ def pinhole(entry: Any, names: Sequence[str], path: Path) -> Camera:
 
 
 def check_camera(camera: Camera, name: str) -> None:
-    """Look at the numbers of frame `name`'s camera.
-
-    Raises
-    ------
-    BadInputError
-        One is not finite or beyond what any camera has.
-    """
+    """Raise `BadInputError` where a number of frame `name`'s camera is not finite or beyond what any camera has."""
     side = max(camera.width, camera.height)
     if min(camera.width, camera.height) < MIN_SIZE:
         raise BadInputError(

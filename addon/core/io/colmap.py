@@ -43,13 +43,7 @@ def find_model(root: Path) -> Path | None:
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the model, the mesh and, where there is one, the list of objects.
-
-    Raises
-    ------
-    BadInputError
-        The model is missing or damaged, or there is no mesh.
-    """
+    """Read the model and the mesh, as `layout.Reader` has it."""
     folder = find_model(root)
     if folder is None:
         raise BadInputError(
@@ -106,10 +100,7 @@ def frames_of(
 def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
     """The image's pose in OpenGL axes, (4, 4) float64.
 
-    Raises
-    ------
-    BadInputError
-        Not finite, no direction, or too far off.
+    Raises `BadInputError` where it is not finite, has no direction, or lies too far off.
     """
     finite = all(map(math.isfinite, (*image.quaternion, *image.translation)))
     if not finite or not math.hypot(*image.quaternion) > 1e-9:

@@ -71,10 +71,7 @@ def model_files(folder: Path) -> tuple[Path, Path] | None:
 def read_model(folder: Path) -> ColmapModel:
     """The model in `folder`.
 
-    Raises
-    ------
-    BadInputError
-        A file is missing or damaged, or a camera is of a model that is not known.
+    Raises `BadInputError` where a file is missing or damaged, or a camera is of a model that is not known.
     """
     files = model_files(folder)
     if files is None:

@@ -103,13 +103,7 @@ def all_axes() -> list[str]:
 
 
 def parse(text: str) -> Convention:
-    """The convention that `text` writes.
-
-    Raises
-    ------
-    BadInputError
-        It can't be read.
-    """
+    """The convention that `text` writes; raises `BadInputError` where it can't be read."""
     convention = Convention()
     for part in filter(None, (p.strip() for p in text.split(","))):
         part = NAMED.get(part, part)

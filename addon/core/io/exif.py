@@ -30,10 +30,7 @@ TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: 
 def read_tags(data: bytes | mmap.mmap, pointer: int | None = None) -> dict[int, float]:
     """First value of each numeric tag in the directory at `pointer` of the TIFF `data`; None takes the first directory.
 
-    Raises
-    ------
-    ValueError
-        `data` is no TIFF, or ends before its directory does.
+    Raises `ValueError` where `data` is no TIFF, or ends before its directory does.
     """
     order = ORDERS.get(data[:4])
     if order is None:

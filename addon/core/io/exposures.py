@@ -41,10 +41,7 @@ class Settings(NamedTuple):
 def settings_of(entry: dict[str, Any], name: str) -> Settings | None:
     """The camera's settings among the keys of a frame's JSON object or of a line of a CSV; None where it has none.
 
-    Raises
-    ------
-    BadInputError
-        One of them is no number above 0.
+    Raises `BadInputError` where one of them is no number above 0.
     """
     key_of = {_plain(key): key for key, value in entry.items() if isinstance(key, str) and value not in (None, "")}
     values = []

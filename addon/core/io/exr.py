@@ -20,10 +20,7 @@ HALF_MAX: Unit[float] = 65504.0
 def read_header(path: Path) -> tuple[int, int]:
     """Width and height of the picture that `read_exr` would give; cheap, and finds a file that was cut off.
 
-    Raises
-    ------
-    BadInputError
-        As `read_exr`, but for damage within the compressed pixels.
+    Raises as `read_exr`, but for damage within the compressed pixels.
     """
     return _layer_to_read(path)[0].header.size
 
@@ -74,10 +71,7 @@ def read_exr(path: Path) -> Picture:
 def read_numbers(path: Path) -> np.ndarray:
     """The numbers of the picture `path` as they are stored, not taken as colours: (h, w, c) in their own type.
 
-    Raises
-    ------
-    BadInputError
-        As `read_exr`, or the data window is not the display window.
+    Raises as `read_exr`, and where the data window is not the display window.
     """
     headers = parse_headers(path)
     if len(headers) == 1 and list(headers[0].channels.values()) == [(1, 1)]:  # one channel of any name

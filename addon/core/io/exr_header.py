@@ -92,10 +92,7 @@ class _Chunks:
 def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
     """Read and check the headers of all parts and the tables of chunks of the OpenEXR file `path`.
 
-    Raises
-    ------
-    BadInputError
-        Absent, not a file, not OpenEXR, damaged, cut off, or deep.
+    Raises `BadInputError` where it is absent, not a file, not OpenEXR, damaged, cut off, or deep.
     """
     try:
         check_picture(path)

@@ -49,10 +49,7 @@ class ExrLayer:
 def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, str]:
     """The layer that is the picture, and a note ('' where there was no choice).
 
-    Raises
-    ------
-    BadInputError
-        No layer has colours, or several do and none is called as the whole picture.
+    Raises `BadInputError` where no layer has colours, or several do and none is called as the whole picture.
     """
     view = next((h.view for h in headers if h.view), "")
     views = tuple(dict.fromkeys([h.view for h in headers if h.view] + [v for h in headers for v in h.views]))

@@ -129,13 +129,7 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
 
 
 def check_links(root: Path, name: str, files: Iterable[Path]) -> None:
-    """Look where the links among the files of frame `name` lead.
-
-    Raises
-    ------
-    EscapesError
-        A file that lies in the capture by its name lies outside by a link.
-    """
+    """Raise `EscapesError` where a file of frame `name` lies in the capture by its name and outside by a link."""
     for path in files:
         if not path.is_relative_to(root):
             continue

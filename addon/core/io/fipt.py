@@ -48,13 +48,7 @@ def _read(
 
 
 def read_synthetic(root: Path, reading: Reading) -> Layout:
-    """Read a synthetic scene: the views of its `train` split.
-
-    Raises
-    ------
-    BadInputError
-        The poses or the mesh can't be read.
-    """
+    """Read a synthetic scene, as `layout.Reader` has it: the views of its `train` split."""
     path = root / SPLIT / POSES
     top = read_json(path)
     entries, angle = top.get("frames"), top.get("camera_angle_x")
@@ -73,13 +67,7 @@ def read_synthetic(root: Path, reading: Reading) -> Layout:
 
 
 def read_real(root: Path, reading: Reading) -> Layout:
-    """Read a real capture.
-
-    Raises
-    ------
-    BadInputError
-        A table of cameras is damaged, they differ in length, or the mesh can't be read.
-    """
+    """Read a real capture, as `layout.Reader` has it."""
     poses, intrinsics = _triples(root / CAMERAS), _triples(root / INTRINSICS)
     if len(poses) != len(intrinsics):
         raise BadInputError(

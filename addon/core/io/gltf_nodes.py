@@ -38,21 +38,10 @@ class Placed(NamedTuple):
 
 
 def placed_meshes(nodes: list[dict[str, Any]], meshes: int, path: Path) -> list[Placed]:
-    """Each mesh of each node, in the nodes' order.
+    """Each mesh of each node, in the order of the file's `nodes`; `meshes` is how many there are.
 
-    Parameters
-    ----------
-    nodes : list of dict
-        As in the file.
-    meshes : int
-        How many there are.
-    path : Path
-        The file, for messages.
-
-    Raises
-    ------
-    BadInputError
-        A node names what is not there, has two parents or is its own, or has a transformation that is none.
+    Raises `BadInputError` where a node names what is not there, has two parents or is its own, or has a transformation
+    that is none; `path` is the file.
     """
     damaged = BadInputError(f"Mesh '{path}' has nodes that contradict each other; export it again.")
     parent = np.full(len(nodes), -1)

@@ -30,13 +30,7 @@ def is_heif(head: bytes) -> bool:
 
 
 def heif_header(path: Path) -> Header:
-    """What the header of `path` says.
-
-    Raises
-    ------
-    BadInputError
-        Damaged, larger than any picture, or there is no pillow-heif.
-    """
+    """What the header of `path` says; raises `BadInputError` for a damaged or too large one, or without pillow-heif."""
     with decoding(path):
         return _checked(_open(path), path)
 
@@ -61,10 +55,7 @@ def heif_orientation(path: Path) -> int:
 def read_heif(path: Path) -> Stored:
     """Read the pixels of `path`: uint8 codes, or uint16 where they have 10 or 12 bits, scaled to 0...65535.
 
-    Raises
-    ------
-    BadInputError
-        As `heif_header`, and where the pixels are damaged or cut off.
+    Raises as `heif_header`, and where the pixels are damaged or cut off.
     """
     with decoding(path):
         file = _open(path)

@@ -56,9 +56,7 @@ def assign(
     object_id : (t,) int
         As the mesh has it, or as it was found.
     names : dict of int to str, or None
-        As `read_instances` gives it; None where the capture has none.
-    names_file : str
-        Where the names come from, for messages.
+        As `read_instances` gives it, from `names_file`; None where the capture has none.
 
     Returns
     -------

@@ -148,10 +148,7 @@ class Layout:
 def usable(make: Callable[[Any], Frame], entries: Iterable[Any]) -> tuple[list[Frame], list[str]]:
     """The frames that `make` makes of what is told of each, in their order, and a sentence on each that can't be made.
 
-    Raises
-    ------
-    EscapesError
-        A path leads out of the capture: no slip of one frame.
+    Raises `EscapesError` where a path leads out of the capture: no slip of one frame.
     """
     frames, problems = [], []
     for entry in entries:

@@ -13,13 +13,7 @@ MESH = "mesh.ply"
 
 
 def read_mesh(path: Path, reading: Reading) -> RawMesh:
-    """Read the mesh `path`.
-
-    Raises
-    ------
-    BadInputError
-        It is absent, damaged, or of a kind that can't be read.
-    """
+    """Read the mesh `path`; raises `BadInputError` where it is absent, damaged, or of a kind that can't be read."""
     ending = path.suffix.lower()
     if ending in IMPORTED:
         if reading.import_mesh is None:

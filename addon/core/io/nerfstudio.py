@@ -45,14 +45,7 @@ def find(root: Path) -> list[Path]:
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the poses, the mesh and the objects' names.
-
-    Raises
-    ------
-    BadInputError
-        A file is not JSON, lists no frames, has an unknown lens, or leads out of the capture's folder; the mesh or the
-        list of objects can't be read.
-    """
+    """Read the poses and the mesh, as `layout.Reader` has it."""
     paths = find(root) or [root / FILE]
     top = read_json(paths[0])
     mesh = read_mesh(_mesh_path(root, top, reading), reading)
@@ -220,10 +213,7 @@ def _settings(entry: Entry) -> Settings | None:
 def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
     """From the original world to that of the poses (`applied_transform`, `applied_scale`), (4, 4); None: the same.
 
-    Raises
-    ------
-    BadInputError
-        They are no matrix and no number.
+    Raises `BadInputError` where they are no matrix and no number.
     """
     matrix = top.get("applied_transform")
     if matrix is None and (root / "colmap/sparse/0").is_dir():

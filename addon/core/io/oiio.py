@@ -76,10 +76,8 @@ class Stored(NamedTuple):
 def coded_header(path: Path) -> Header:
     """What the header of the PNG, JPEG or TIFF `path` says, its pixels left alone.
 
-    Raises
-    ------
-    BadInputError
-        Absent, damaged, larger than any picture, or of a depth that isn't supported; or there is no OpenImageIO.
+    Raises `BadInputError` where it is absent, damaged, larger than any picture, or of a depth that isn't supported; or
+    there is no OpenImageIO.
     """
     return _checked(_open(path), path)
 
@@ -92,12 +90,8 @@ def coded_orientation(path: Path) -> int:
 def read_coded(path: Path) -> Stored:
     """Read the pixels of the PNG, JPEG or TIFF `path`.
 
-    As stored: what the file says of colour spaces and of how the camera was held is not heeded here.
-
-    Raises
-    ------
-    BadInputError
-        As `coded_header`, and where the pixels are damaged or cut off.
+    As stored: what the file says of colour spaces and of how the camera was held is not heeded here. Raises as
+    `coded_header`, and where the pixels are damaged or cut off.
     """
     file = _open(path)
     spec = file.spec()

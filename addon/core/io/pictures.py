@@ -25,10 +25,7 @@ ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".h
 def picture_kind(path: Path) -> str:
     """One of the kinds above, of `oiio`, `heif.HEIC` or `raw.DNG`.
 
-    Raises
-    ------
-    BadInputError
-        The file is absent, empty, or of a kind that isn't known.
+    Raises `BadInputError` where the file is absent, empty, or of a kind that isn't known.
     """
     check_picture(path)
     head = read_bytes(path, "Picture ", 16)

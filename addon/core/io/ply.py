@@ -67,17 +67,12 @@ def read_ply(path: Path) -> RawMesh:
 
 
 def read_columns(path: Path, groups: Sequence[tuple[str, ...]]) -> dict[str, np.ndarray | None]:
-    """The first of several `groups` of scalar properties that vertices and faces have.
+    """The first of several `groups` of scalar properties that vertices and faces have. Raises as `read_ply`.
 
     Returns
     -------
     dict of str to (n, k) or None
         Of 'vertex' and 'face': a group's properties side by side, None where they have none; without what is absent.
-
-    Raises
-    ------
-    BadInputError
-        The file can't be read, or is damaged.
     """
     with _one_sentence(path):
         found = {}
@@ -139,7 +134,7 @@ def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
 
 
 def parse_header(content: bytes) -> tuple[str, list[Element], int]:
-    """Parse the head of `content`.
+    """Parse the head of `content`; the text of a `ValueError` is the second half of a sentence about the file.
 
     Returns
     -------
@@ -148,11 +143,6 @@ def parse_header(content: bytes) -> tuple[str, list[Element], int]:
     elements : list of Element
     start : int
         Position of the first byte behind the header.
-
-    Raises
-    ------
-    ValueError
-        The text is the second half of a sentence that begins with the file's name.
     """
     if content[:3] != b"ply":
         raise ValueError("is empty" if not content else "is not a PLY file")

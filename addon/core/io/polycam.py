@@ -44,13 +44,7 @@ def find(root: Path) -> bool:
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the cameras and the mesh.
-
-    Raises
-    ------
-    BadInputError
-        There are no cameras or there is no mesh, or the mesh or its alignment can't be read.
-    """
+    """Read the cameras and the mesh, as `layout.Reader` has it."""
     path = find_mesh(root, reading, (MESH,), EXPORT)
     corrected = all((root / FOLDER / name).is_dir() for name in CORRECTED)
     cameras, pictures = (root / FOLDER / name for name in (CORRECTED if corrected else OWN))

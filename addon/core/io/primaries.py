@@ -46,10 +46,7 @@ def xyz_to_rec709(to_xyz: np.ndarray) -> np.ndarray:
 def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) -> np.ndarray:
     """Convert linear `rgb` ((h, w, 3) float32) from `chromaticities`; white becomes white (Bradford).
 
-    Raises
-    ------
-    BadInputError
-        The primaries span no colours; `name` is the file.
+    Raises `BadInputError` where the primaries span no colours; `name` is the file.
     """
     if np.allclose(chromaticities, REC709, atol=1e-3):
         return rgb

@@ -36,13 +36,7 @@ def is_dng(path: Path) -> bool:
 
 
 def raw_size(path: Path) -> tuple[int, int]:
-    """Width and height as stored, in pixels.
-
-    Raises
-    ------
-    BadInputError
-        Damaged, larger than any picture, or there is no rawpy.
-    """
+    """Width and height as stored; raises `BadInputError` for a damaged or too large picture, or without rawpy."""
     with _open(path) as file:
         return int(file.sizes.width), int(file.sizes.height)
 
@@ -50,10 +44,7 @@ def raw_size(path: Path) -> tuple[int, int]:
 def read_raw(path: Path) -> Stored:
     """Read the DNG `path` as stored, not turned: 1 is where the sensor clips.
 
-    Raises
-    ------
-    BadInputError
-        As `raw_size`, and where the pixels are damaged or cut off.
+    Raises as `raw_size`, and where the pixels are damaged or cut off.
     """
     with _open(path) as file:
         import rawpy

@@ -78,10 +78,7 @@ def _loaded(point: EntryPoint) -> Reader:
 def reader_for(root: Path, name: str = "") -> Reader:
     """The reader of the capture `root`: the one called `name`, or the first that finds its files.
 
-    Raises
-    ------
-    BadInputError
-        No format is called so, or none fits.
+    Raises `BadInputError` where no format is called so, or none fits.
     """
     known = readers()
     if name:

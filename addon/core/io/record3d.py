@@ -34,13 +34,7 @@ def find(root: Path) -> bool:
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the poses, the cameras and the mesh.
-
-    Raises
-    ------
-    BadInputError
-        The recording is zipped, its metadata can't be read, or there are no pictures or no mesh.
-    """
+    """Read the poses, the cameras and the mesh, as `layout.Reader` has it."""
     parts = _parts(root)
     if parts is None:
         archive = next(iter(sorted(root.glob(f"*{ARCHIVE}"))), root / f"recording{ARCHIVE}")

@@ -38,13 +38,7 @@ FAR = 3.0
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the mesh, its light or the frames beside it, its objects and mirrors.
-
-    Raises
-    ------
-    BadInputError
-        The mesh, its textures or its objects can't be read.
-    """
+    """Read the mesh, its light or the frames beside it, its objects and mirrors, as `layout.Reader` has it."""
     if reading.mesh is not None:
         raise BadInputError(f"Capture '{root}' has its light on its own mesh; leave --mesh away.")
     mesh = read_ply(root / MESH)

@@ -43,13 +43,7 @@ PICTURES = (_Pictures("dslr/resized_images", "dslr/resized_anon_masks", False),
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the mesh with its objects and the frames.
-
-    Raises
-    ------
-    BadInputError
-        The mesh, the poses or the annotation can't be read, or there are no pictures.
-    """
+    """Read the mesh with its objects and the frames, as `layout.Reader` has it."""
     mesh = read_mesh(reading.mesh or root / MESH, reading)
     names = None
     if reading.mesh is None and (root / SEGMENTS).exists() and (root / OBJECTS).exists():

@@ -46,12 +46,8 @@ def check_segments(segments: Path | str) -> None:
 def laid_on(layout: Layout, segments: Path | str, root: Path) -> Layout:
     """The layout with `segments` as its mesh's objects, in place of all else that tells of any.
 
-    Ids of a file are called 'segment_<id>', or as the capture's `info_semantic.json` names them.
-
-    Raises
-    ------
-    BadInputError
-        The segments can't be read or don't fit the mesh, or it has no materials.
+    Ids of a file are called 'segment_<id>', or as the capture's `info_semantic.json` names them. Raises `BadInputError`
+    where the segments can't be read or don't fit the mesh, or it has no materials.
     """
     mesh = layout.mesh
     if not segments:

@@ -32,14 +32,9 @@ OFF_CENTRE: Limit[float] = 0.1
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the poses, the cameras and the mesh, and take the frames out of the video.
+    """Read the poses, the cameras and the mesh, as `layout.Reader` has it, and take the frames out of the video.
 
-    Raises
-    ------
-    BadInputError
-        The poses, the camera, the video or the mesh can't be read, or they don't belong together.
-    StorageError
-        As `video.frames`.
+    Raises `StorageError` as well, as `video.frames` does.
     """
     path = find_mesh(root, reading, remedy=f"Stray Scanner {FUSE}")  # first: a video takes half a minute
     rows = _rows(root)

@@ -30,13 +30,7 @@ def find(root: Path) -> bool:
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the mesh and find its texture.
-
-    Raises
-    ------
-    BadInputError
-        There is no mesh or no texture on it, or one that can't be read.
-    """
+    """Read the mesh and find its texture, as `layout.Reader` has it."""
     path = find_mesh(root, reading)
     if path.suffix.lower() not in IMPORTED:
         raise BadInputError(f"Mesh '{path}' can't have a texture; give a GLB, glTF or OBJ file, or cameras and frames.")

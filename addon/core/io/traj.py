@@ -28,13 +28,7 @@ PICTURE = re.compile(r"^frame(\d+)$", re.IGNORECASE)
 
 
 def read(root: Path, reading: Reading) -> Layout:
-    """Read the poses, the camera and the mesh.
-
-    Raises
-    ------
-    BadInputError
-        The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
-    """
+    """Read the poses, the camera and the mesh, as `layout.Reader` has it."""
     camera = _camera(root)
     lines = _lines(root / POSES)
     pictures = _pictures(root / FOLDER)

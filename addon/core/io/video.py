@@ -55,7 +55,7 @@ SLACK: Limit[float] = 0.01
 
 
 def frames(video: Path, windows: Sequence[np.ndarray]) -> dict[int, Path]:
-    """The sharpest frame of each window, as a picture on disk: sRGB codes, Rec.709, as stored (not turned).
+    """The sharpest frame of each window, as a picture on disk, by number: sRGB codes, Rec.709, as stored (not turned).
 
     8 bits, or 16 where the video has more. Those that were taken out before are used again, without PyAV.
 
@@ -63,11 +63,6 @@ def frames(video: Path, windows: Sequence[np.ndarray]) -> dict[int, Path]:
     ----------
     windows : sequence of (n,) int arrays
         Numbers of frames in the order in which they are shown, from 0; each above all of those before.
-
-    Returns
-    -------
-    dict of int to Path
-        By the frames' numbers.
 
     Raises
     ------

@@ -162,12 +162,8 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
     """Both together: key by key what is newer wins, and what it took back is gone.
 
     A newly given `same_as` replaces an older description of the highlight, and the other way round; a diffuse surface
-    or a lamp has no older roughness or F0.
-
-    Raises
-    ------
-    BadInputError
-        Objects are to be the same as each other in a circle.
+    or a lamp has no older roughness or F0. Raises `BadInputError` where objects come to be the same as each other in a
+    circle.
     """
     objects = {i: given for i, given in older.objects.items() if (i, "") not in newer.back}
     for object_id, name in newer.back:
@@ -193,17 +189,9 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
 
 
 def read_overrides(path: Path, known: Iterable[int]) -> Overrides:
-    """The overrides in a file.
+    """The overrides in a file; `known` are the capture's objects.
 
-    Parameters
-    ----------
-    known : iterable of int
-        The capture's objects.
-
-    Raises
-    ------
-    BadInputError
-        One sentence that names file, object and key, and what is allowed.
+    Raises `BadInputError`, one sentence that names file, object and key, and what is allowed.
     """
     path = Path(path)
     if not path.is_file():
@@ -223,21 +211,9 @@ def kept_overrides(folder: Path, known: Iterable[int]) -> Overrides:
 
 
 def heeded(folder: Path, known: Iterable[int], file: Path | None = None, keep: bool = True) -> Overrides:
-    """What a run heeds: what its result folder keeps, and over that what is in a `file`.
+    """What a run heeds: what its result folder keeps (unless `keep` is False), and over that what is in a `file`.
 
-    Parameters
-    ----------
-    folder : Path
-        The result folder.
-    known : iterable of int
-        The capture's objects.
-    keep : bool
-        False leaves out what the folder keeps.
-
-    Raises
-    ------
-    BadInputError
-        As `read_overrides` and `merge`.
+    `known` are the capture's objects. Raises as `read_overrides` and `merge`.
     """
     known = set(known)
     older = kept_overrides(folder, known) if keep else NONE

@@ -194,8 +194,7 @@ class Store:
 def _take_lock(folder: Path, shared: bool = False):
     """Lock `folder`, against all others or those alone that don't share it; returns the open lock file.
 
-    The system frees it when it is closed or its process dies.
-    So a run that was killed leaves no lock behind, and no process id has to be asked whether it still lives.
+    The system frees it when it is closed or its process dies, so a run that was killed leaves none behind.
     """
     # A link in a folder that somebody else made must not have its target emptied.
     no_link = getattr(os, "O_NOFOLLOW", 0)

@@ -18,10 +18,7 @@ Arrays = dict[str, np.ndarray]
 def packed(value: Any, arrays: Arrays) -> Any:
     """A value in what JSON knows; its arrays, and NumPy's own numbers, are put into `arrays`.
 
-    Raises
-    ------
-    TypeError
-        There is something in it that is no value.
+    Raises `TypeError` where there is something in it that is no value.
     """
     if value is None or isinstance(value, (bool, int, str)):
         return value
@@ -45,19 +42,9 @@ def packed(value: Any, arrays: Arrays) -> Any:
 
 
 def unpacked(stored: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, type]) -> Any:
-    """The inverse of `packed`.
+    """The inverse of `packed`; `kinds` are the frozen values that may be in it, by name.
 
-    Parameters
-    ----------
-    stored
-        As JSON has it.
-    kinds : mapping of str to type
-        The frozen values that may be in it, by name.
-
-    Raises
-    ------
-    LookupError
-        Something in it is none of these, or an array or a reflectance model is not there.
+    Raises `LookupError` where something in it is none of these, or an array or a reflectance model is not there.
     """
     if not isinstance(stored, dict):
         return stored
