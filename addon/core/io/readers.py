@@ -81,13 +81,10 @@ def reader_for(root: Path, name: str = "") -> Reader:
     Raises `BadInputError` where no format is called so, or none fits.
     """
     known = readers()
+    found = next((reader for reader in known if (reader.name == name if name else reader.find(root))), None)
+    if found is not None:
+        return found
     if name:
-        for reader in known:
-            if reader.name == name:
-                return reader
         raise BadInputError(f"There is no format '{name}'; choose one of {', '.join(r.name for r in known)}.")
-    for reader in known:
-        if reader.find(root):
-            return reader
     wanted = "; ".join(f"{reader.wants} ({reader.name})" for reader in known)
     raise BadInputError(f"Folder '{root}' holds no capture that is known; it needs one of: {wanted}.")

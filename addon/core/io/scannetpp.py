@@ -6,7 +6,7 @@ the pinhole camera of `dslr/nerfstudio/transforms_undistorted.json`. Its own pic
 given, or EXR put beside or in place of them. The views that `dslr/train_test_lists.json` calls 'test' are kept out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +28,12 @@ MODEL, LISTS, POSES = "dslr/colmap", "dslr/train_test_lists.json", "dslr/nerfstu
 PINHOLE = "dslr/nerfstudio/transforms_undistorted.json"
 
 
-@dataclass(frozen=True)
-class _Pictures:
-    """A folder of pictures, that of their masks, and whether the lens was taken out."""
-
-    folder: str
-    masks: str
-    pinhole: bool
-
-
-PICTURES = (_Pictures("dslr/resized_images", "dslr/resized_anon_masks", False),
-            _Pictures("dslr/resized_undistorted_images", "dslr/resized_undistorted_masks", True),
-            _Pictures("dslr/undistorted_images", "dslr/undistorted_anon_masks", True))  # fmt: skip
+PICTURES = (
+    ("dslr/resized_images", "dslr/resized_anon_masks", False),
+    ("dslr/resized_undistorted_images", "dslr/resized_undistorted_masks", True),
+    ("dslr/undistorted_images", "dslr/undistorted_anon_masks", True),
+)
+"""Folders of pictures, those of their masks, and whether the lens was taken out."""
 
 
 def read(root: Path, reading: Reading) -> Layout:
@@ -49,24 +43,22 @@ def read(root: Path, reading: Reading) -> Layout:
     if reading.mesh is None and (root / SEGMENTS).exists() and (root / OBJECTS).exists():
         ids, names = objects_of(root, mesh)
         mesh = replace(mesh, object_id=ids)
-    kind = _pictures(root)
-    frames, problems, notes = colmap.frames_of(read_model(root / MODEL), root, root / kind.folder, reading)
-    if kind.pinhole and frames:
+    folder, masks, is_pinhole = _pictures(root)
+    frames, problems, notes = colmap.frames_of(read_model(root / MODEL), root, root / folder, reading)
+    if is_pinhole and frames:
         frames = _undistorted(frames, root)
     frames, more = _chosen(frames, root)
-    frames = [_masked(frame, root / kind.folder, root / kind.masks) for frame in frames]
+    frames = [_masked(frame, root / folder, root / masks) for frame in frames]
     return Layout(frames, mesh, names, OBJECTS, problems, notes + more)
 
 
-def _pictures(root: Path) -> _Pictures:
-    """The folder with HDR pictures; else the first that is there."""
-    present = [kind for kind in PICTURES if (root / kind.folder).is_dir()]
+def _pictures(root: Path) -> tuple[str, str, bool]:
+    """The entry of `PICTURES` with HDR pictures; else the first that is there."""
+    present = [entry for entry in PICTURES if (root / entry[0]).is_dir()]
     if not present:
-        raise BadInputError(f"Capture '{root}' has no pictures; put them into '{root / PICTURES[0].folder}'.")
-    for kind in present:
-        if any(path.suffix.lower() in colmap.HDR for path in (root / kind.folder).iterdir()):
-            return kind
-    return present[0]
+        raise BadInputError(f"Capture '{root}' has no pictures; put them into '{root / PICTURES[0][0]}'.")
+    hdr = (e for e in present if any(path.suffix.lower() in colmap.HDR for path in (root / e[0]).iterdir()))
+    return next(hdr, present[0])
 
 
 def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:

@@ -133,13 +133,9 @@ def copy_gltf(path: Path, folder: Path) -> Copy:
         for primitive in list_of(mesh, "primitives", path):
             if not is_index(primitive.get("material"), count):
                 primitive.pop("material", None)
-            extensions = primitive.get("extensions")
-            extensions = (
-                {COMPRESSED: extensions[COMPRESSED]}
-                if isinstance(extensions, dict) and COMPRESSED in extensions
-                else {}
-            )
-            primitive["extensions"] = extensions
+            extensions = primitive.pop("extensions", None)
+            if isinstance(extensions, dict) and COMPRESSED in extensions:
+                primitive["extensions"] = {COMPRESSED: extensions[COMPRESSED]}
     meshes = list_of(top, "meshes", path)
     placed = placed_meshes(list_of(top, "nodes", path), len(meshes), path)
     sizes, faces = [_triangles(mesh, top, path) for mesh in meshes], 0
@@ -250,9 +246,9 @@ def _decode(path: Path, uri: str, target: Path) -> None:
 def _check_sizes(top: dict[str, Any], sizes: list[int], path: Path) -> None:
     """Compare what views and accessors claim with what there is: importers take them at their word."""
     for view in list_of(top, "bufferViews", path):
-        buffer = view.get("buffer")
+        buffer: Any = view.get("buffer")
         end = _count(view.get("byteOffset", 0)) + _count(view.get("byteLength"))
-        if not isinstance(buffer, int) or _count(buffer) >= len(sizes) or end > sizes[buffer]:
+        if not is_index(buffer, len(sizes)) or end > sizes[buffer]:
             raise BadInputError(f"Mesh '{path}' points beyond its buffers: it is damaged; export it again.")
     for accessor in list_of(top, "accessors", path):
         if not _count(accessor.get("count")) <= (MAX_BARE if "bufferView" not in accessor else sum(sizes)):

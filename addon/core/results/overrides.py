@@ -23,7 +23,7 @@ from ..brdf.model import Brdf
 from ..brdf.registry import find, models
 from ..errors import BadInputError
 from ..io.files import readable
-from ..json_values import is_number, key
+from ..json_values import is_number, key, plain
 
 OVERRIDES = "overrides.json"
 LOBE = ("model", "roughness", "f0")
@@ -75,12 +75,7 @@ class Given:
 
     def as_dict(self) -> dict[str, Any]:
         """What is given, as the file has it."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-            if value is not None
-        }
+        return {name: value for name, value in plain(self).items() if value is not None}
 
 
 @dataclass(frozen=True)

@@ -173,23 +173,16 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
 
 
 def _picture_to_json(frame: Frame) -> dict[str, Any]:
-    """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
-
-    def absolute(path: Path | None) -> str | None:
-        return None if path is None else str(path.absolute())
-
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
+    """How a frame's pictures are to be read; JSON has no inf, so an archive holds null for it."""
     return {
-        "mask_path": absolute(frame.mask_path),
-        "id_path": absolute(frame.id_path),
+        "mask_path": frame.mask_path and str(frame.mask_path.absolute()),
+        "id_path": frame.id_path and str(frame.id_path.absolute()),
         "exposure": frame.exposure,
-        "saturation": finite(frame.saturation),
+        "saturation": frame.saturation,
         "transfer": frame.transfer,
         "turned": frame.turned,
         "margin": frame.margin,
-        "brackets": [[absolute(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
+        "brackets": [[str(shot.path.absolute()), shot.exposure, shot.saturation] for shot in frame.brackets],
     }
 
 
