@@ -47,7 +47,7 @@ def is_number(value: Any) -> TypeGuard[float]:
     )
 
 
-def float_of(text: str) -> float:
+def float_of(text: str | bytes) -> float:
     """The number that a text is; NaN where it is none."""
     try:
         return float(text)

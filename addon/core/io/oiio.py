@@ -40,15 +40,7 @@ LITTLE: Limit[int] = 1 << 16
 
 
 class Header(NamedTuple):
-    """What a picture's header says.
-
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    bits : int
-        Of a channel, 8 or 16; 0 for floats.
-    """
+    """What a picture's header says; `bits` are a channel's, 8 or 16, and 0 for floats."""
 
     width: int
     height: int

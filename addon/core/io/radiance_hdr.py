@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import float_of
 from ..kinds import Code, Limit
 from .files import read_bytes
 from .picture import MAX_PIXELS, Picture
@@ -190,10 +191,7 @@ def _old_line(content: bytes, at: int, line: np.ndarray, last: bytes) -> int:
 
 
 def _numbers(text: bytes, count: int, path: Path) -> np.ndarray:
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError:
-        numbers = []
+    numbers = [float_of(word) for word in text.split()]
     if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
         raise BadInputError(f"Picture '{path}' has a damaged header; write or copy it again.")
     return np.array(numbers)

@@ -1,5 +1,6 @@
 """Result folders: how much they take, and clearing what can be made again: the finished stages, and nothing else."""
 
+import contextlib
 import os
 import re
 from collections.abc import Iterable
@@ -36,10 +37,8 @@ def size(folder: Path | str) -> int:
     total = 0
     for where, _, names in os.walk(folder):
         for name in names:
-            try:
+            with contextlib.suppress(OSError):
                 total += os.lstat(os.path.join(where, name)).st_size
-            except OSError:
-                continue
     return total
 
 

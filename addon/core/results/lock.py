@@ -110,11 +110,10 @@ def _make(path: Path, content: bytes) -> int | None:
     """The new lock's open file; None where there is one already."""
     try:
         file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
-    except (FileExistsError, PermissionError) as error:
-        if isinstance(error, PermissionError) and not path.exists():  # Windows refuses what is just being deleted
-            raise _refused(path, error) from error
-        return None
     except OSError as error:
+        # Windows refuses what is just being deleted.
+        if isinstance(error, FileExistsError) or (isinstance(error, PermissionError) and path.exists()):
+            return None
         raise _refused(path, error) from error
     try:
         os.write(file, content)
@@ -169,10 +168,8 @@ def _owner_is_gone(content: bytes) -> bool:
         return False
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return True
-    except OSError:
-        return False
+    except OSError as error:
+        return isinstance(error, ProcessLookupError)
     return False
 
 
