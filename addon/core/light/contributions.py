@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..parallel import for_blocks
+from ..parallel import blocks, for_blocks
 from .directions import cosine_patterns, turned
 from .emitters import BrightTriangles, shining
 from .environment import Environment
@@ -67,14 +67,11 @@ def reaching_most(field: LightField, element: np.ndarray, groups: list[list[int]
     position, normal = field.atlas.position[element], field.atlas.normal[element]
     patterns, rng = cosine_patterns(LIGHT_FIT.emitter_rays, seed), np.random.default_rng(seed)
     hit_count = np.zeros(len(groups))
-
-    def run(part: slice) -> None:
+    for part in blocks(len(element), ELEMENTS_AT_ONCE):
         start = np.repeat(field.scene.off_surface(position[part], normal[part]), LIGHT_FIT.emitter_rays, 0)
         triangle = field.scene.intersect(start, turned(patterns, normal[part], rng)[0].reshape(-1, 3)).triangle
         group = group_of[triangle[triangle >= 0]]
         np.add.at(hit_count, group[group >= 0], 1)
-
-    for_blocks(run, len(element), ELEMENTS_AT_ONCE, 1)
     return np.sort(np.argsort(-hit_count, kind="stable")[:count]).tolist()
 
 

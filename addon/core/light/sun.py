@@ -140,16 +140,10 @@ def sunlight(
     return np.concatenate([contribution[:, None] * light, (error * light.mean())[:, None]], 1).astype(np.float32)
 
 
-def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Direction ((h, 2h, 3)) and solid angle ((h, 1)) of a map's texels."""
-    latitude = (np.arange(height) + 0.5) / height * np.pi - np.pi / 2
-    longitude = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    cosine = np.cos(latitude)[:, None]
-    directions = np.stack(
-        [cosine * np.cos(longitude), cosine * np.sin(longitude), np.sin(latitude)[:, None] + 0 * longitude], -1
-    )
+def _solid_angle(height: int) -> np.ndarray:
+    """Of a texel in each row of a map, (h, 1) float64."""
     edges = np.sin(np.arange(height + 1) / height * np.pi - np.pi / 2)
-    return directions.astype(np.float32), (np.diff(edges) * np.pi / height)[:, None]
+    return (np.diff(edges) * np.pi / height)[:, None]
 
 
 def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
@@ -163,7 +157,7 @@ def extract_sun(environment: Environment) -> tuple[Environment, Sun | None]:
     seen = environment.measured
     if not seen.any():
         return environment, None
-    directions, solid_angle = _directions(len(luminance))
+    directions, solid_angle = environment.directions.reshape(environment.radiance.shape), _solid_angle(len(luminance))
     radius = max(WIDE, 1.5 * np.pi / len(luminance))  # its own texel and those around it, where they are coarse
     peak = np.unravel_index(np.where(seen, luminance, -1).argmax(), luminance.shape)
     disc = (directions @ directions[peak] > np.cos(2 * radius)) & (luminance > luminance[peak] / 4)
@@ -206,11 +200,11 @@ def insert_sun(environment: Environment, sun: Sun | None) -> np.ndarray:
     column = (0.5 - np.arctan2(directions[:, 1], directions[:, 0]) / (2 * np.pi)) * width - 0.5
     row = np.clip((0.5 + np.arcsin(np.clip(directions[:, 2], -1, 1)) / np.pi) * height - 0.5, 0, height - 1)
     left, low = np.floor(column), np.minimum(np.floor(row), height - 2)
-    _, solid = _directions(height)
+    solid_angle = _solid_angle(height)
     for a in (0, 1):
         for b in (0, 1):
             share = np.abs(1 - a - (row - low)) * np.abs(1 - b - (column - left)) / len(directions)
             texel = (low + a).astype(int), (left + b).astype(int) % width
             for c in range(3):
-                np.add.at(radiance[..., c], texel, share * sun.irradiance[c] / solid[texel[0], 0])
+                np.add.at(radiance[..., c], texel, share * sun.irradiance[c] / solid_angle[texel[0], 0])
     return radiance.astype(np.float32)

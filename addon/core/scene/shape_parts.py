@@ -238,10 +238,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     flat[piece_of_plane] = True
     first = np.unique(piece, return_index=True)[1]  # a triangle of each piece, to find it again
     joined = _over_convex_edges(faces, piece, flat)
-    order = np.argsort(-np.bincount(joined, faces.area), kind="stable")
-    rank = np.empty(len(order), int)
-    rank[order] = np.arange(len(order))
-    part = rank[joined]
+    part = np.argsort(np.argsort(-np.bincount(joined, faces.area), kind="stable"))[joined]
     named_planes = tuple(
         replace(plane, part=int(part[first[plane_piece]]), name=_name(plane, faces, gap))
         for plane_piece, plane in zip(piece_of_plane, planes, strict=True)

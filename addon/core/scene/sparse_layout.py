@@ -4,8 +4,6 @@ What is smaller than its coarse cell (`seen_cells`) shares the cell's block of t
 between their centres. Larger triangles lie apart, each with a texel as wide as half a cell. No two triangles overlap.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .elements import Crumbs
@@ -15,29 +13,6 @@ from .params import SPARSE, SURFACE
 from .seen_cells import SeenCells
 
 
-@dataclass(frozen=True)
-class SparseLayout:
-    """Triangles in a strip of texels.
-
-    Attributes
-    ----------
-    triangle : (k,) int
-        Sorted.
-    uv : (k, 3, 2) float64
-        In texels of the strip.
-    width, height : int
-        Of the strip, in texels.
-    crumbs : Crumbs
-        Those of `triangle` that share a block, in texels of the strip.
-    """
-
-    triangle: np.ndarray
-    uv: np.ndarray
-    width: int
-    height: int
-    crumbs: Crumbs
-
-
 class Sparse:
     """The triangles that are laid out sparsely, and how wide their texels are to be.
 
@@ -45,6 +20,13 @@ class Sparse:
     ----------
     texel : float
         Edge of the room's elements, metres.
+
+    Attributes
+    ----------
+    triangle : (k,) int
+        Sorted.
+    edge : (t,) float64
+        Of a texel, metres.
     """
 
     def __init__(self, mesh: Mesh, cells: SeenCells, texel: float):
@@ -69,8 +51,18 @@ class Sparse:
         self._seen = seen
         self.triangle = np.flatnonzero((edge > 1.5 * texel) | self._small)
 
-    def placed(self, width: int, coarser: float = 1.0) -> SparseLayout:
-        """Placed in a strip so wide, texels `coarser` times as wide as wanted."""
+    def placed(self, width: int, coarser: float) -> tuple[np.ndarray, int, Crumbs]:
+        """Placed in a strip so wide, texels `coarser` times as wide as wanted.
+
+        Returns
+        -------
+        uv : (k, 3, 2) float64
+            In texels of the strip.
+        height : int
+            Of the strip, in texels.
+        crumbs : Crumbs
+            Those that share a block, in texels of the strip.
+        """
         chosen = self.triangle
         uv = np.zeros((len(chosen), 3, 2))
         apart = np.flatnonzero(~self._small[chosen])
@@ -89,13 +81,11 @@ class Sparse:
         cell = cell.ravel()
         # Side by side are those of one object that lie close, so that smaller copies of an image mix what is alike.
         order = np.lexsort((along_curve(middle[first]), self._mesh.object_id[chosen[small[first]]]))
-        rank = np.empty(len(names), np.int64)
-        rank[order] = np.arange(len(names))
-        row, column = np.divmod(rank, width // SPARSE.block)
+        row, column = np.divmod(np.argsort(order), width // SPARSE.block)
         corner = np.stack([column * SPARSE.block, top + row * SPARSE.block], 1)
         uv[small] = tiled(cell) + 0.5 + corner[cell][:, None]
         height = top + SPARSE.block * -(-len(names) // (width // SPARSE.block))
-        return SparseLayout(chosen, uv, width, height, Crumbs(chosen[small], cell, corner))
+        return uv, height, Crumbs(chosen[small], cell, corner)
 
 
 def flattened(corner: np.ndarray) -> np.ndarray:
@@ -119,8 +109,7 @@ def tiled(group: np.ndarray) -> np.ndarray:
     order = np.argsort(group, kind="stable")
     count = np.bincount(group)
     start = np.cumsum(count) - count
-    rank = np.empty(len(group), np.int64)
-    rank[order] = np.arange(len(group)) - start[group[order]]
+    rank = np.argsort(order) - start[group]
     across = np.ceil(np.sqrt((count + 1) // 2)).astype(np.int64)[group]
     square, upper = np.divmod(rank, 2)
     row, column = np.divmod(square, across)
@@ -167,17 +156,17 @@ def with_strip(
     step = SURFACE.step
     size, coarser = min(-(-int(np.ceil(edge)) // step) * step, largest), 1.0
     while True:
-        strip = sparse.placed(size, coarser)
-        if size < largest and size - strip.height < edge:
+        strip_uv, height, crumbs = sparse.placed(size, coarser)
+        if size < largest and size - height < edge:
             size = min(size + step, largest)
-        elif size >= largest and strip.height > SPARSE.highest * size:
+        elif size >= largest and height > SPARSE.highest * size:
             coarser *= 2
         else:
             break
-    square = size - strip.height
+    square = size - height
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     is_dense = np.ones(len(uv), bool)
-    is_dense[strip.triangle] = False
+    is_dense[sparse.triangle] = False
     uv[is_dense] = dense * (square / size)
-    uv[strip.triangle] = (strip.uv + (0, square)) / size
-    return uv, size, square, strip.crumbs._replace(corner=strip.crumbs.corner + (0, square))
+    uv[sparse.triangle] = (strip_uv + (0, square)) / size
+    return uv, size, square, crumbs._replace(corner=crumbs.corner + (0, square))

@@ -5,6 +5,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from .params import SURFACE
+from .weld import same_place
 
 
 def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
@@ -20,13 +21,7 @@ def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
     (t, 3) int64
     """
     bits = np.ascontiguousarray(uv, np.float32).view(np.int32).reshape(-1, 2)
-    vertex = triangles.ravel()
-    order = np.lexsort((bits[:, 1], bits[:, 0], vertex))
-    new = np.ones(len(order), bool)
-    new[1:] = (np.diff(vertex[order]) != 0) | (np.diff(bits[order], axis=0) != 0).any(1)
-    ids = np.empty(len(order), np.int64)
-    ids[order] = np.cumsum(new) - 1
-    return ids.reshape(-1, 3)
+    return same_place(np.column_stack([triangles.ravel(), bits]))[1].reshape(-1, 3)
 
 
 def components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
@@ -53,8 +48,7 @@ def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarra
         corners = corners + label[:, None] * (corners.max(initial=0) + 1)
     nodes, node = np.unique(corners.ravel(), return_inverse=True)
     a, b, c = node.reshape(-1, 3).T
-    piece = components(np.r_[a, b], np.r_[b, c], len(nodes))[a]
-    return np.unique(piece, return_inverse=True)[1].reshape(-1)
+    return components(np.r_[a, b], np.r_[b, c], len(nodes))[a].astype(np.int64)
 
 
 def areas(uv: np.ndarray) -> np.ndarray:

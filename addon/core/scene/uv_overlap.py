@@ -74,8 +74,7 @@ def layers(pairs: np.ndarray, height: np.ndarray) -> np.ndarray:
         0 for all triangles without overlap.
     """
     layer = np.zeros(len(height), np.int64)
-    rank = np.empty(len(height), np.int64)
-    rank[np.argsort(height, kind="stable")] = np.arange(len(height))
+    rank = np.argsort(np.argsort(height, kind="stable"))
     number = 0
     while len(pairs):
         undecided = np.zeros(len(height), bool)
