@@ -125,8 +125,8 @@ class _Scene:
 
     def colour(self, convention: Convention, every: int = 1) -> Fit:
         views = self.views[::every]
-        result = consistency(views, convention.cameras([view.camera for view in views]), self.rays, self.exposed)
-        return Fit(convention, result.score, float("nan"), result.hit)
+        colour, hit = consistency(views, convention.cameras([view.camera for view in views]), self.rays, self.exposed)
+        return Fit(convention, colour, float("nan"), hit)
 
     def mesh_views(self, convention: Convention) -> list[MeshView]:
         cameras = convention.cameras([view.camera for view in self.views])

@@ -1,7 +1,6 @@
 """Do views agree on the colour of the spots that they share? They do only with the right poses."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,24 +11,12 @@ from .params import AGREEMENT
 from .views import SmallView, sees
 
 
-class Consistency(NamedTuple):
-    """How well views agree.
+def consistency(
+    views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, exposed: bool
+) -> tuple[float, float]:
+    """Compare views of the same spots: how alike they are, and the share of their rays that meet the mesh.
 
-    Attributes
-    ----------
-    score : float
-        Probability that two views of one spot differ by less than views of two spots: 0.5 by chance, 1 at best; NaN
-        where too few spots are shared.
-    hit : float
-        Share of the views' rays that meet the mesh.
-    """
-
-    score: float
-    hit: float
-
-
-def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, exposed: bool) -> Consistency:
-    """Compare views of the same spots.
+    That is `colour` and `hit` of a `look.Fit`.
 
     Parameters
     ----------
@@ -68,6 +55,6 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
                 other_spot.append(np.abs(log_radiance[inside] - other_log[rng.permutation(len(inside))]).mean(1))
     hit = hits / max(rays, 1)
     if sum(map(len, same_spot)) < LEVELS.many:
-        return Consistency(float("nan"), hit)
+        return float("nan"), hit
     a, b = np.concatenate(same_spot), np.concatenate(other_spot)
-    return Consistency(float((a < b).mean() + (a == b).mean() / 2), hit)
+    return float((a < b).mean() + (a == b).mean() / 2), hit

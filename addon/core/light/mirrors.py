@@ -7,7 +7,7 @@ through it (`over_mirrors`). On the living room that took the albedo from 28.0 t
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,13 +38,9 @@ class Mirror:
     normal: np.ndarray
     f0: np.ndarray
 
-    def as_lists(self) -> dict[str, Any]:
-        """For JSON."""
-        return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
-
     @staticmethod
     def from_lists(entry: dict[str, Any]) -> Mirror:
-        """What `as_lists` gave."""
+        """From its fields as JSON has them."""
         point, normal, f0 = (np.asarray(entry[name], np.float32) for name in ("point", "normal", "f0"))
         return Mirror(entry["object_id"], point, normal, f0)
 

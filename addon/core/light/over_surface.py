@@ -1,5 +1,6 @@
 """E over the surface: which estimator is evaluated at which elements, and what is interpolated between."""
 
+from collections.abc import Callable
 from typing import TypedDict
 
 import numpy as np
@@ -88,37 +89,27 @@ def irradiance(
     bright = bright_triangles(field)
     lamp_rays = emitter_rays if len(bright) else 0
     portals = find_portals(field, seed) if portal_rays else None
-    steps = {"count": 0}
     gathering, aiming = Rounds(progress, 0.0, 0.75), Rounds(progress, 0.75, 1.0)
+    points = rounds = 0
 
     def gathered(index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """E and the escaped share in four channels, and the radius R, at some of the elements."""
-        value, radius = np.zeros((len(index), 4), np.float32), np.ones(len(index), np.float32)
-        steps["count"] += 1
+        nonlocal rounds
+        rounds += 1
+        first_seed = seed + 7919 * rounds
 
-        def run(part: slice) -> None:
-            elements = element[index[part]]
-            block_seed = seed + 7919 * steps["count"] + part.start
-            result = gather(
-                field,
-                bright,
-                atlas.position[elements],
-                atlas.normal[elements],
-                rays,
-                lamp_rays,
-                block_seed,
-                portals,
-                portal_rays,
-            )
-            value[part, :3], radius[part], value[part, 3] = result
+        def gather_at(p: np.ndarray, n: np.ndarray, start: int) -> np.ndarray:
+            block_seed = first_seed + start
+            E, radius, escaped = gather(field, bright, p, n, rays, lamp_rays, block_seed, portals, portal_rays)
+            return np.column_stack([E, escaped, radius])
 
-        for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, gathering)
+        at_once = max(ELEMENTS_AT_ONCE * 64 // rays, 64)
+        value = _by_blocks(atlas, element[index], gather_at, 5, threads, at_once, gathering)
         gathering.next()
-        return value, radius
+        return value[:, :4], value[:, 4]
 
     blocks = TexelBlocks(atlas, element, threads)
     step = block_step(atlas) if interpolate else 1
-    points = 0
 
     def around(index: np.ndarray) -> np.ndarray:
         """E, the escaped share and the contrast, (k, 5) float32."""
@@ -133,15 +124,11 @@ def irradiance(
 
     def aim(index: np.ndarray) -> np.ndarray:
         """The lamps' part of E, and its noise, (k, 4) float32."""
-        result = np.empty((len(index), 4), np.float32)
 
-        def run(part: slice) -> None:
-            elements = element[index[part]]
-            result[part, :3], result[part, 3] = direct(
-                field, bright, atlas.position[elements], atlas.normal[elements], rays, lamp_rays, seed + 1 + part.start
-            )
+        def aim_from(p: np.ndarray, n: np.ndarray, start: int) -> np.ndarray:
+            return np.column_stack(direct(field, bright, p, n, rays, lamp_rays, seed + 1 + start))
 
-        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads, aiming)
+        result = _by_blocks(atlas, element[index], aim_from, 4, threads, progress=aiming)
         aiming.next()
         return result
 
@@ -185,16 +172,30 @@ def _from_sun(
 ) -> np.ndarray:
     """The sun's part of E and its error at elements that `blocks` were made of, (m, 4) float32."""
 
+    def shine_on(p: np.ndarray, n: np.ndarray, start: int) -> np.ndarray:
+        return sunlight(field.scene, sun, p, n, field.atlas.texel_edge, seed + 2 + start)
+
     def shine(index: np.ndarray) -> np.ndarray:
-        result, edge, atlas = np.empty((len(index), 4), np.float32), field.atlas.texel_edge, field.atlas
-
-        def run(part: slice) -> None:
-            elements = element[index[part]]
-            result[part] = sunlight(
-                field.scene, sun, atlas.position[elements], atlas.normal[elements], edge, seed + 2 + part.start
-            )
-
-        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
-        return result
+        return _by_blocks(field.atlas, element[index], shine_on, 4, threads)
 
     return blocks.evaluate(shine, step, GATHER.smooth, around)
+
+
+def _by_blocks(
+    atlas: Atlas,
+    element: np.ndarray,
+    function: Callable[[np.ndarray, np.ndarray, int], np.ndarray],
+    channels: int,
+    threads: int,
+    at_once: int = ELEMENTS_AT_ONCE,
+    progress: Rounds | None = None,
+) -> np.ndarray:
+    """A function of positions, normals and the first one's number, at elements ((m,) int), (m, channels) float32."""
+    result = np.empty((len(element), channels), np.float32)
+
+    def run(part: slice) -> None:
+        elements = element[part]
+        result[part] = function(atlas.position[elements], atlas.normal[elements], part.start)
+
+    for_blocks(run, len(element), at_once, threads, progress)
+    return result

@@ -60,16 +60,9 @@ class Sun:
             f"(differences of log albedo between light and shade {before:.3f} to {after:.3f})."
         )
 
-    def as_lists(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "direction": np.asarray(self.direction).tolist(), "irradiance": np.asarray(self.irradiance).tolist(),
-            "radius": float(self.radius), "seen": bool(self.seen), "edges": self.edges,
-        }  # fmt: skip
-
     @staticmethod
     def from_lists(entry: dict[str, Any]) -> Sun:
-        """What `as_lists` gave."""
+        """From its fields as JSON has them."""
         direction, irradiance = (np.asarray(entry[name], np.float32) for name in ("direction", "irradiance"))
         edges = entry["edges"] and tuple(entry["edges"])
         return Sun(direction, irradiance, entry["radius"], entry["seen"], edges)

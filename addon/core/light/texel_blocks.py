@@ -6,11 +6,12 @@ points, a texel costs a few array look-ups: fine texels cost little more than co
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ..kinds import Block
-from ..parallel import for_blocks
+from ..parallel import blocks, ordered_map
 from ..scene.atlas import Atlas
 from .params import GATHER
 
@@ -83,46 +84,39 @@ class TexelBlocks:
         """
         count = len(self._row)
         base = np.zeros(count, np.float32) if base is None else base
-        value = None
-        known = np.zeros(count, bool)
-        remaining = np.arange(count, dtype=np.int32)
-        while len(remaining):
+        value, known = np.zeros((count, 3), np.float32), np.zeros(count, bool)
+        done, remaining = known.copy(), np.arange(count, dtype=np.int32)
+
+        def learn(index: np.ndarray) -> None:
+            nonlocal value
+            values = function(index)
+            if not known.any():
+                value = np.zeros((count, values.shape[1]), np.float32)
+            value[index], known[index], done[index] = values, True, True
+
+        def spread(block: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+            index, corner, weight = block
+            near = value[corner]
+            level = near[..., :3].mean(2)
+            mean = level.mean(1)
+            deviation = np.abs(level - mean[:, None]).max(1)
+            flat = np.full(len(index), True) if np.isinf(tolerance) else deviation <= tolerance * (mean + base[index])
+            # Corners are known themselves; writing their own value again changes nothing.
+            value[index[flat]] = np.einsum("kc,kcv->kv", weight[flat], near[flat])
+            done[index[flat]] = True
+
+        while len(remaining) and step >= 2:
+            parts = (remaining[part] for part in blocks(len(remaining), BLOCK))
+            served = list(ordered_map(partial(self._served, step=step), parts, self._threads))
             wanted = np.zeros(count, bool)
-            served: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
-            if step >= 2:
-
-                def mark(part: slice, step=step, remaining=remaining, wanted=wanted, served=served) -> None:
-                    served[part.start] = self._served(remaining[part], step)
-                    wanted[served[part.start][1]] = True
-
-                for_blocks(mark, len(remaining), BLOCK, self._threads)
-            else:
-                wanted[remaining] = True
-            new = np.flatnonzero(wanted & ~known)
-            if len(new):
-                values = function(new)
-                if value is None:
-                    value = np.zeros((count, values.shape[1]), np.float32)
-                value[new], known[new] = values, True
-            if step < 2:
-                break
-            done = known.copy()
-
-            def spread(part: slice, done=done, value=value, served=served) -> None:
-                index, corner, weight = served[part.start]
-                near = value[corner]
-                level = near[..., :3].mean(2)
-                mean = level.mean(1)
-                deviation = np.abs(level - mean[:, None]).max(1)
-                flat = (
-                    np.full(len(index), True) if np.isinf(tolerance) else deviation <= tolerance * (mean + base[index])
-                )
-                # Corners are known themselves; writing their own value again changes nothing.
-                value[index[flat]] = np.einsum("kc,kcv->kv", weight[flat], near[flat])
-                done[index[flat]] = True
-
-            if value is not None:
-                for_blocks(spread, len(remaining), BLOCK, self._threads)
+            for _, corner, _ in served:
+                wanted[corner] = True
+            if (wanted & ~known).any():
+                learn(np.flatnonzero(wanted & ~known))
+            for _ in ordered_map(spread, served, self._threads):
+                pass
             remaining = remaining[~done[remaining]]
             step //= 2
-        return np.zeros((count, 3), np.float32) if value is None else value
+        if len(remaining):
+            learn(remaining.astype(np.int64))
+        return value

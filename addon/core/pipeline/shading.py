@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..json_values import plain
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.lamps import Lamp, lamp_kinds
@@ -231,9 +232,9 @@ def to_store(shading: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         arrays |= {f"openings_{field.name}": getattr(shading.openings, field.name) for field in fields(Openings)}
     arrays |= {f"patches_{field.name}": getattr(shading.patches, field.name) for field in fields(Patches)}
     meta = {
-        "sun": shading.sun and shading.sun.as_lists(),
+        "sun": plain(shading.sun),
         "points": shading.points,
-        "mirrors": [mirror.as_lists() for mirror in shading.mirrors],
+        "mirrors": plain(shading.mirrors),
         "notes": list(shading.notes),
         "lamps": [asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in shading.lamps],
     }

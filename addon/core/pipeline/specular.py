@@ -11,6 +11,7 @@ import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
+from ..json_values import plain
 from ..light.field import LightField
 from ..light.over_surface import sun_irradiance
 from ..light.sun import Sun
@@ -77,7 +78,7 @@ class Specular:
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
         meta: dict[str, Any] = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
-        meta["sun"] = self.sun and self.sun.as_lists()
+        meta["sun"] = plain(self.sun)
         return {
             "specular": self.specular, "excess": self.excess,
             "rest_spread": self.rest.interquartile_range, "rest_count": self.rest.count, "rest_tier": self.rest.tier,

@@ -147,22 +147,27 @@ def find_elements(
     del u, v
     # Each triangle's surface is shared out between its texels; what no texel covers is left out.
     count = np.bincount(triangle, minlength=len(mesh.triangles))
-    area = mesh.geometry[1]
-    shared = (area[triangle] / count[triangle]).astype(np.float32)
+    shared = (mesh.geometry[1][triangle] / count[triangle]).astype(np.float32)
     padding = np.full(size * size, -1, np.int32)
     padding[texel] = np.arange(len(texel), dtype=np.int32)
     elements, own = Elements(texel, triangle, position, shared, padding), len(texel)
     del texel, triangle, position, shared  # or they were held beside what is made of them
     if crumbs is not None and len(crumbs.triangle):
-        elements = _with_crumbs(elements, _of_crumbs(mesh, size, area, crumbs), size)
+        elements = _with_crumbs(elements, mesh, size, crumbs)
     return _merged(elements._replace(padding=_padded(elements.padding, size)), own, coarse)
 
 
-def _with_crumbs(elements: Elements, of_crumbs: tuple[np.ndarray, ...], size: int) -> Elements:
+def _with_crumbs(elements: Elements, mesh: Mesh, size: int, crumbs: Crumbs) -> Elements:
     """Elements, and those of cells of crumbs after them."""
-    texels = of_crumbs[0][:, None] + np.array([0, 1, size, size + 1])
+    middle = mesh.vertices[mesh.triangles[crumbs.triangle]].mean(1, dtype=np.float64)
+    chosen = _nearest_to_middle(middle, crumbs.cell)
+    texel = (crumbs.corner[:, 1] * size + crumbs.corner[:, 0]).astype(np.int32)
+    area = np.bincount(crumbs.cell, mesh.geometry[1][crumbs.triangle]).astype(np.float32)
     padding = elements.padding
-    padding[texels] = len(elements.texel) + np.arange(len(texels), dtype=np.int32)[:, None]
+    padding[texel[:, None] + np.array([0, 1, size, size + 1])] = (
+        len(elements.texel) + np.arange(len(texel), dtype=np.int32)[:, None]
+    )
+    of_crumbs = texel, crumbs.triangle[chosen].astype(np.int32), middle[chosen].astype(np.float32), area
     texel, triangle, position, area = (np.concatenate(both) for both in zip(elements[:-1], of_crumbs, strict=True))
     return Elements(texel, triangle, position, area, padding)
 
@@ -174,15 +179,6 @@ def _padded(element: np.ndarray, size: int) -> np.ndarray:
     row *= size
     row += column
     return element.take(row.ravel())
-
-
-def _of_crumbs(mesh, size, area, crumbs):
-    """Texel, triangle, position and area of the element of each cell."""
-    corner = mesh.vertices[mesh.triangles[crumbs.triangle]].mean(1, dtype=np.float64)
-    chosen = _nearest_to_middle(corner, crumbs.cell)
-    texel = (crumbs.corner[:, 1] * size + crumbs.corner[:, 0]).astype(np.int32)
-    total = np.bincount(crumbs.cell, area[crumbs.triangle]).astype(np.float32)
-    return texel, crumbs.triangle[chosen].astype(np.int32), corner[chosen].astype(np.float32), total
 
 
 def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from ..kinds import Block
 from .model import Frame
 from .params import SIDES
 from .rays import RayScene
-from .weld import weld
+from .weld import same_place, weld
 
 PACK: Block[int] = 8
 """Frames whose votes are summed at once; bounds the memory."""
@@ -104,12 +104,8 @@ def _summed(votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> tuple[np.
     if not votes:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
     triangle, ids, count = (np.concatenate(part) for part in zip(*votes))
-    if not len(triangle):
-        return triangle, ids, count
-    order = np.lexsort((ids, triangle))
-    triangle, ids, count = triangle[order], ids[order], count[order]
-    first = np.flatnonzero(np.append(True, (np.diff(triangle) != 0) | (np.diff(ids) != 0)))
-    return triangle[first], ids[first], np.add.reduceat(count, first)
+    first, pair = same_place(np.column_stack([triangle, ids]))
+    return triangle[first], ids[first], np.bincount(pair, count, len(first)).astype(np.int64)
 
 
 def _spread(vertices: np.ndarray, triangles: np.ndarray, ids: np.ndarray, known: np.ndarray) -> np.ndarray:

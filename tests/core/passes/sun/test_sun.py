@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from addon.core.json_values import plain
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
 from addon.core.light.field import LightField
@@ -226,7 +227,7 @@ def test_a_sun_in_the_map_gives_its_irradiance_from_its_place(rows, direction):
 @pytest.mark.parametrize("edges", [None, (0.5, 0.25)])
 def test_a_sun_comes_back_from_json(edges):
     sun = Sun(np.float32([0, 0.6, 0.8]), np.float32([3, 2, 1]), 0.01, edges is None, edges)
-    again = Sun.from_lists(json.loads(json.dumps(sun.as_lists())))
+    again = Sun.from_lists(json.loads(json.dumps(plain(sun))))
     assert again.note == sun.note and (again.radius, again.seen, again.edges) == (0.01, edges is None, edges)
     for name in ("direction", "irradiance"):
         a, b = getattr(sun, name), getattr(again, name)
