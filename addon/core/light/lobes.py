@@ -23,7 +23,7 @@ from ..brdf.model import Microfacets
 from ..kinds import Block, Code
 from ..paper.brdf import G1
 from ..parallel import for_blocks
-from ..scene.tangent_frame import tangent_frame
+from ..scene.tangent_frame import dot, tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
 from .params import GATHER
@@ -135,28 +135,28 @@ def reflected_light(
         elements = np.repeat(element[part], 2)
         n, wo = room.atlas.normal[elements], np.repeat(direction[part], 2, 0)
         axes = np.stack([*tangent_frame(n), n]).transpose(0, 2, 1)[..., None]  # (3 axes, 3, m, 1): +Z is the normal
-        local_wo = np.stack([_dot(axis, wo.T[..., None])[:, 0] for axis in axes])
+        local_wo = np.stack([dot(axis, wo.T[..., None])[:, 0] for axis in axes])
         local_wo[2] = np.maximum(local_wo[2], 1e-4)
         origin = room.scene.off_surface(room.atlas.position[elements], n)
         directions, targets = [], []  # targets: the triangle that a ray must meet, or `ANY`
         for phi in proposals:
             h = ggx.sample_visible_normal(local_wo, _stratified(len(elements), per_proposal, rng, turned), phi)
-            directions.append(2 * _dot(h, local_wo[..., None]) * h - local_wo[..., None])
+            directions.append(2 * dot(h, local_wo[..., None]) * h - local_wo[..., None])
             targets.append(np.full((len(elements), per_proposal), ANY, np.int32))
         if len(bright):
             cube = rng.random((len(elements), per_proposal, 3), np.float32)
             cube[..., 0] = (np.arange(per_proposal, dtype=np.float32) + cube[..., 0]) / per_proposal
             pick = sample_bright(bright, cube)
             aimed = pick.point.T.reshape(3, len(elements), per_proposal) - origin.T[..., None]
-            aimed /= np.maximum(np.sqrt(_dot(aimed, aimed)), 1e-9)
-            directions.append(np.stack([_dot(axis, aimed) for axis in axes]))
+            aimed /= np.maximum(np.sqrt(dot(aimed, aimed)), 1e-9)
+            directions.append(np.stack([dot(axis, aimed) for axis in axes]))
             targets.append(pick.triangle.reshape(len(elements), per_proposal))
         w = np.concatenate(directions, 2).astype(np.float32)
         L, density = _arriving(room, bright, origin, w, axes, np.concatenate(targets, 1).ravel())
         density *= per_proposal
 
         n_w, n_wo = np.maximum(w[2], 1e-4), local_wo[2][:, None]
-        cosine = _dot(w, local_wo[..., None])  # w.wo, from which |w + wo|, w.h and n.h follow
+        cosine = dot(w, local_wo[..., None])  # w.wo, from which |w + wo|, w.h and n.h follow
         hx, hy = w[0] + local_wo[0][:, None], w[1] + local_wo[1][:, None]
         sin2_h = np.minimum((hx * hx + hy * hy) / np.maximum(2 + 2 * cosine, 1e-9), 1)
         s = rise(np.sqrt(np.clip((1 + cosine) / 2, 0, 1)))
@@ -214,7 +214,7 @@ def _arriving(room, bright, origin, w, axes, targets) -> tuple[np.ndarray, np.nd
     L, density = np.zeros((m * k, 3), np.float32), np.zeros(m * k, np.float32)
     directions = np.empty((len(above), 3), np.float32)
     for j in range(3):
-        directions[:, j] = _dot(w, axes[:, j]).ravel().take(above)
+        directions[:, j] = dot(w, axes[:, j]).ravel().take(above)
     start = origin.take(above // k, 0)
     hits = room.scene.intersect(start, directions)
     targets = targets.take(above)
@@ -223,11 +223,6 @@ def _arriving(room, bright, origin, w, axes, targets) -> tuple[np.ndarray, np.nd
     if len(bright):
         density[above] = aimed_density(bright, hits, directions, room.normal)
     return L.reshape(m, k, 3), density.reshape(m, k)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Sum of products over the first axis, of three planes each: many times as fast as einsum along short rows."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _stratified(count: int, each: int, rng: np.random.Generator, turned: bool) -> np.ndarray:

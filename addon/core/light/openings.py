@@ -82,6 +82,17 @@ def exits(
     return (side * GATHER.cells + row) * GATHER.cells + column, distance, cosines[index, axis]
 
 
+def in_cells(cell: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Points of the box (0...1) at a `place` (0...1, (n, k, 2)) in each of n flat cells, (n, k, 3) float64."""
+    side, row, column = np.unravel_index(cell, (6, GATHER.cells, GATHER.cells))
+    axis, index = side // 2, np.arange(len(cell))
+    share = np.empty((*place.shape[:2], 3))
+    share[index, :, axis] = (side % 2)[:, None]
+    share[index, :, (axis + 1) % 3] = (row[:, None] + place[..., 0]) / GATHER.cells
+    share[index, :, (axis + 2) % 3] = (column[:, None] + place[..., 1]) / GATHER.cells
+    return share
+
+
 @dataclass(frozen=True)
 class Panel:
     """Bright cells that lie side by side: a lamp, or a window, that no frame saw.
@@ -177,7 +188,9 @@ class Openings:
         facing = np.abs(normal[np.arange(len(cell)), side_of_cell[cell] // 2])
         closed_area = np.bincount(cell, 0.5 * double[:, 0] * facing, CELLS)
         in_front = faces + np.float32(self.size.max() * PANEL_OFFSET) * normal[:, None]
-        quads = self._quads(side_of_cell, *np.divmod(np.arange(CELLS) % GATHER.cells**2, GATHER.cells))
+        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+        corners = np.where((side_of_cell % 2)[:, None, None], corners[::-1], corners)  # they face the room
+        quads = (self.low + in_cells(np.arange(CELLS), corners) * self.size).astype(np.float32)
         area = np.linalg.norm(np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]), axis=1)
         is_open = 2 * closed_area < area
         remaining = self.radiance
@@ -209,17 +222,6 @@ class Openings:
                 label, count = ndimage.label(bright[side] & (step[side] == level))
                 groups += [np.flatnonzero(label.ravel() == k) + side * GATHER.cells**2 for k in range(1, count + 1)]
         return groups
-
-    def _quads(self, side: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Corners of some cells ((q,) int each), facing the room, (q, 4, 3) float32."""
-        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
-        corners = np.where((side % 2)[:, None, None], corners[::-1], corners)
-        axis, index = side // 2, np.arange(len(side))
-        share = np.empty((len(side), 4, 3))
-        share[index, :, axis] = (side % 2)[:, None]
-        share[index, :, (axis + 1) % 3] = (row[:, None] + corners[..., 0]) / GATHER.cells
-        share[index, :, (axis + 2) % 3] = (column[:, None] + corners[..., 1]) / GATHER.cells
-        return (self.low + share * self.size).astype(np.float32)
 
 
 def _subdivided(faces: np.ndarray, size: float) -> np.ndarray:

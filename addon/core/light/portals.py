@@ -13,7 +13,7 @@ from ..scene.tangent_frame import to_world
 from ..significance import LEVELS
 from .directions import cosine_hemisphere, shifted, sobol
 from .field import LightField
-from .openings import CELLS, exits, within
+from .openings import CELLS, exits, in_cells, within
 from .params import GATHER
 
 
@@ -74,19 +74,11 @@ class Portals:
         n, k, _ = square.shape
         strata = (np.arange(k, dtype=np.float32) + rng.random((n, k), np.float32)) / np.float32(k)
         pick = self.cell[np.minimum(np.searchsorted(np.cumsum(self.chance), strata.ravel()), len(self) - 1)]
-        side, row, column = pick // GATHER.cells**2, pick // GATHER.cells % GATHER.cells, pick % GATHER.cells
-        flat = square.reshape(-1, 2)
-        axis = side // 2
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        index = np.arange(len(pick))
-        point = np.empty((len(pick), 3), np.float32)
-        point[index, axis] = side % 2
-        point[index, first] = (row + flat[:, 0]) / GATHER.cells
-        point[index, second] = (column + flat[:, 1]) / GATHER.cells
+        point = in_cells(pick, square.reshape(-1, 1, 2))[:, 0].astype(np.float32)
         offset = self.low + point * self.size - np.repeat(origins, k, 0)
         distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
         directions = offset / np.maximum(distance, 1e-12)[:, None]
-        cosine = np.abs(directions[index, axis])
+        cosine = np.abs(directions[np.arange(len(pick)), pick // (2 * GATHER.cells**2)])
         return directions, self.density[pick] * distance**2 / np.maximum(cosine, 1e-6)
 
 

@@ -53,7 +53,7 @@ class Shading:
     points: int
     sun: Sun | None = None
     openings: Openings | None = None
-    patches: Patches = field(default_factory=Patches.none)
+    patches: Patches = field(default_factory=Patches)
 
     @property
     def emitters(self) -> set[int]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..luminance import LUMINANCE
+from ..paper.p_square import Summary
 from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
@@ -17,7 +18,7 @@ from ..scene.model import Frame, Mesh, Pixels
 from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
 from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, bytes_of_frame, observe, view_frame
-from .medians import Estimator, Summary, make_estimator, summaries
+from .medians import Estimator, make_estimator, summaries
 
 
 def frame_order(count: int, seed: int) -> np.ndarray:

@@ -147,15 +147,10 @@ def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width
     known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
     infinite = np.isposinf(texels).any(-1)
     known |= infinite
-    values = np.concatenate(
-        [
-            np.where(known[..., None], np.minimum(texels, HALF_MAX), 0),
-            known[..., None],
-            (known & (infinite | (texels >= HALF_MAX).any(-1)))[..., None],
-        ],
-        -1,
-        dtype=np.float64,
-    )
+    values = np.empty((*known.shape, 5))
+    values[..., :3] = np.where(known[..., None], np.minimum(texels, HALF_MAX), 0)
+    values[..., 3] = known
+    values[..., 4] = known & (infinite | (texels >= HALF_MAX).any(-1))
     table = np.zeros((len(texels), size + 1, size + 1, 5))
     table[:, 1:, 1:] = values.cumsum(1).cumsum(2)
     edge = np.clip(np.rint(width), 1, size).astype(np.int64)[:, None]

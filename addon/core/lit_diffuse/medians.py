@@ -12,8 +12,6 @@ import numpy as np
 from ..paper.p_square import PSquare, Summary
 from .exact import Exact
 
-__all__ = ["Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator", "summaries"]
-
 
 class Estimator(Protocol):
     """What accumulation needs of an estimator."""

@@ -67,7 +67,7 @@ def find_shading(
             surface.mesh, surface.atlas, surface.scene, lit_diffuse, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    patches, parts_guessed, whole = Patches.none(), capture.mesh.whole, surface.atlas.object_id
+    patches, parts_guessed, whole = Patches(), capture.mesh.whole, surface.atlas.object_id
     cameras = [frame.camera for frame in capture.frames]
     set_apart = parts_guessed and not {"clipped-patches", "missing-light"} & set(s.without)
     if set_apart:

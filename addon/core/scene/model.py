@@ -129,9 +129,9 @@ class Camera:
         return replace(self, width=self.width // step, height=self.height // step, fx=self.fx / step,
                        fy=self.fy / step, cx=self.cx / step, cy=self.cy / step)  # fmt: skip
 
-    def pixel_centres(self) -> np.ndarray:
-        """Centres of all pixels row by row, (height * width, 2) float64."""
-        y, x = np.mgrid[: self.height, : self.width]
+    def pixel_centres(self, step: int = 1) -> np.ndarray:
+        """Centres of every `step`-th pixel in x and y, row by row, of all (height * width, 2) float64."""
+        y, x = np.mgrid[step // 2 : self.height : step, step // 2 : self.width : step]
         return np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
 
 

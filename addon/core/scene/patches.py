@@ -21,7 +21,7 @@ def _nothing() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Patches:
-    """Triangles that are set apart.
+    """Triangles that are set apart; none, unless given.
 
     Attributes
     ----------
@@ -34,18 +34,13 @@ class Patches:
         Those that are the same thing as before, of another material (`Instance.part_of`).
     """
 
-    triangle: np.ndarray
-    object_id: np.ndarray
+    triangle: np.ndarray = field(default_factory=_nothing)
+    object_id: np.ndarray = field(default_factory=_nothing)
     mirrors: np.ndarray = field(default_factory=_nothing)
     parts: np.ndarray = field(default_factory=_nothing)
 
     def __len__(self) -> int:
         return len(self.triangle)
-
-    @staticmethod
-    def none() -> Patches:
-        """Where nothing is."""
-        return Patches(_nothing(), _nothing())
 
     @staticmethod
     def together(parts: Sequence[Patches]) -> Patches:

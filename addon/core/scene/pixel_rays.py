@@ -7,6 +7,7 @@ import numpy as np
 from ..kinds import Block
 from .lens import Lens
 from .model import Camera
+from .tangent_frame import dot
 
 
 def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
@@ -54,7 +55,7 @@ def _pinhole_rays(width: int, rows: slice, fx: float, fy: float, cx: float, cy: 
     x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, shape)
     y = np.broadcast_to(((cy - np.arange(rows.start, rows.stop) - 0.5) / fy)[:, None], shape)
     local = np.stack([x, y, np.full(shape, -1.0)]).reshape(3, -1)
-    return local / np.sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2])
+    return local / np.sqrt(dot(local, local))
 
 
 @functools.lru_cache(maxsize=64)

@@ -119,11 +119,10 @@ def colours(
         invalid = ~pixels.valid.ravel() | pixels.saturated.ravel()
         index, pixel = index[hit], pixel[hit]
         log_radiance[row, index] = np.where(invalid[pixel, None], np.nan, log[pixel])
-        observations = np.flatnonzero(sight.frame == number)
-        value[observations] = np.where(
-            pixels.valid.ravel()[sight.pixel[observations], None], log[sight.pixel[observations]], np.nan
-        )
-        clipped[observations] = pixels.saturated.ravel()[sight.pixel[observations]]
+        observations = sight.frame == number
+        pixel = sight.pixel[observations]
+        value[observations] = np.where(pixels.valid.ravel()[pixel, None], log[pixel], np.nan)
+        clipped[observations] = pixels.saturated.ravel()[pixel]
     gain = np.zeros((len(used), 1, 3))
     for _ in range(3):
         level = _median(log_radiance - gain, 0)

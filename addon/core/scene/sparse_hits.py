@@ -17,8 +17,7 @@ def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -
     directions : (n, 3) float32
     hits : Hits
     """
-    y, x = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
-    pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
+    pixels = camera.pixel_centres(step)
     directions, has_ray = camera.rays(pixels)
     if not has_ray.all():
         pixels, directions = pixels[has_ray], directions[has_ray]

@@ -12,6 +12,7 @@ from .model import Camera, Mesh, Pixels
 from .params import VISIBILITY
 from .pixel_rays import rays_of_rows
 from .rays import RayScene
+from .tangent_frame import dot
 
 EDGE_MARGIN: Unit[float] = 0.5
 """Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres."""
@@ -104,12 +105,6 @@ def _shifts(height: int, width: int) -> Iterator[tuple[tuple[slice, slice], tupl
                 yield pixel, neighbour
 
 
-def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Sum over the first axis of `planes` ((3, ...)) times `vector` ((3,) numbers, or planes)."""
-    # Planes one by one: NumPy's sums over an axis of three take five to ten times as long.
-    return planes[0] * vector[0] + planes[1] * vector[1] + planes[2] * vector[2]
-
-
 def view_frame(camera: Camera, mesh: Mesh, scene: RayScene) -> FrameView:
     """Trace the camera's pixels and find the depth edges."""
     height, width = camera.height, camera.width
@@ -121,7 +116,7 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene) -> FrameView:
     step = max(PIXELS_AT_ONCE // width, 1)
     for rows in blocks(height, step):
         local, valid = rays_of_rows(camera, rows)
-        world = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
+        world = np.stack([dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
         directions = np.ascontiguousarray(world.T)
         hits = scene.intersect(camera.centre, directions)
         rays[:, rows] = world.reshape(3, -1, width)
@@ -158,11 +153,11 @@ def _clean(
     # The plane through the hit, seen from the centre: distance along d is offset / (n.d).
     normal = triangle_normal.take(triangle.ravel(), 0).T.reshape(3, height, width)
     normal = np.where(triangle >= 0, normal, -rays)
-    offset = distance * _dot(normal, rays)
+    offset = distance * dot(normal, rays)
     tolerance = VISIBILITY.depth_tolerance * np.maximum(distance, 1e-6)
     clean = np.ones((height, width), bool)
     for pixel, neighbour in _shifts(height, width):
-        along = _dot(normal[:, pixel[0], pixel[1]], rays[:, neighbour[0], neighbour[1]])
+        along = dot(normal[:, pixel[0], pixel[1]], rays[:, neighbour[0], neighbour[1]])
         # cross-multiplied, so that grazing planes divide by nothing
         along *= distance[neighbour]
         along -= offset[pixel]
@@ -175,15 +170,13 @@ def _projected(camera: Camera, offset: np.ndarray) -> tuple[np.ndarray, np.ndarr
     they are seen."""
     right, up, back = camera.camera_to_world[:3, :3].T.tolist()
     if camera.lens is not None:
-        image, visible = camera.lens.project(
-            np.stack([_dot(offset, right), -_dot(offset, up), -_dot(offset, back)], -1)
-        )
+        image, visible = camera.lens.project(np.stack([dot(offset, right), -dot(offset, up), -dot(offset, back)], -1))
         pixels = np.clip(image * (camera.fx, camera.fy) + (camera.cx, camera.cy), -FAR, FAR).astype(np.float32)
         return np.ascontiguousarray(pixels[:, 0]), np.ascontiguousarray(pixels[:, 1]), visible
-    depth = -_dot(offset, back)
+    depth = -dot(offset, back)
     inverse = 1 / np.maximum(depth, np.float32(1e-12))
-    x = float(camera.fx) * (_dot(offset, right) * inverse) + float(camera.cx)
-    y = float(camera.cy) - float(camera.fy) * (_dot(offset, up) * inverse)
+    x = float(camera.fx) * (dot(offset, right) * inverse) + float(camera.cx)
+    y = float(camera.cy) - float(camera.fy) * (dot(offset, up) * inverse)
     return x, y, depth > 0
 
 
@@ -260,10 +253,10 @@ def observe(
     keep = np.flatnonzero(same_object)
     candidates = candidates.take(keep)
     offset = np.stack([plane.take(candidates) for plane in offset])
-    distance = np.sqrt(_dot(offset, offset))
+    distance = np.sqrt(dot(offset, offset))
     direction = offset / -np.maximum(distance, np.float32(1e-12))
     normal = atlas.normal.take(index.take(candidates), 0)
-    angle = np.flatnonzero(_dot(direction, normal.T) >= VISIBILITY.min_cosine)
+    angle = np.flatnonzero(dot(direction, normal.T) >= VISIBILITY.min_cosine)
     candidates, keep, normal = candidates.take(angle), keep.take(angle), normal.take(angle, 0)
     index = index.take(candidates)
     to_camera = np.empty((len(candidates), 3), np.float32)

@@ -70,7 +70,7 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     # have more than .3, 0.279 more than .5 and 0.261 more than .7, and none of the wall.
     chosen = np.flatnonzero(share > 0.5)
     if not len(chosen):
-        return Patches.none()
+        return Patches()
     label = np.full(count, -1)
     # A table by a window, both clipped, is of one piece with it in a fused mesh.
     label[chosen] = connected(weld(mesh.vertices)[mesh.triangles[chosen]], mesh.object_id[chosen].astype(np.int64))

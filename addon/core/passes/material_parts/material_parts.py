@@ -26,7 +26,7 @@ from ...significance import LEVELS
 def seen_pieces(mesh: Mesh, atlas: Atlas, seen: np.ndarray) -> Patches:
     """Connected pieces of objects that enough `seen` elements ((n,) bool) show, but for the most seen of each."""
     count = np.bincount(atlas.triangle[seen], minlength=len(mesh.triangles))
-    next_id, pieces = int(mesh.object_id.max()) + 1, [Patches.none()]
+    next_id, pieces = int(mesh.object_id.max()) + 1, [Patches()]
     for triangles in by_number(mesh.object_id).values():
         if count[triangles].sum() < LEVELS.few:
             continue

@@ -40,7 +40,7 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     atlas, mesh = field.atlas, field.mesh
     clear = np.flatnonzero(~samples.saturated)
     welded, normals = weld(mesh.vertices), mesh.geometry[0]
-    next_id, patches = int(mesh.object_id.max()) + 1, [Patches.none()]
+    next_id, patches = int(mesh.object_id.max()) + 1, [Patches()]
     for object_id, index in by_number(atlas.object_id[samples.element[clear]]).items():
         observations, free = clear[index], mesh.object_id == object_id
         for normal in _facings(atlas.normal[np.unique(samples.element[observations])]):
