@@ -22,12 +22,9 @@ class MeshView(NamedTuple):
 
 
 def mesh_view(camera: Camera, mesh: Mesh, scene: RayScene, bends: bool = True) -> MeshView:
-    """Trace a view and find the mesh's edges: steps in depth, bends, borders of objects.
+    """Trace a view and find the mesh's edges: steps in depth, `bends`, borders of objects.
 
-    Parameters
-    ----------
-    bends : bool
-        Not so in a mesh that was fused from depth: most of its bends are noise.
+    Of a mesh that was fused from depth bends are none: most of them are noise.
     """
     directions = camera.directions(camera.pixel_centres())
     hits = scene.intersect(camera.centre, directions)

@@ -143,13 +143,9 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     Parameters
     ----------
     read : callable(Frame) -> Pixels
-        `capture.pixels.read_pixels`.
+        `io.pixels.read_pixels`.
     search : bool
         Try other conventions where the poses as read don't fit.
-
-    Returns
-    -------
-    Agreement
     """
     mesh = capture.mesh
     scene = _Scene(small_views(capture.frames, read), capture, RayScene(mesh.vertices, mesh.triangles))

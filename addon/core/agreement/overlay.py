@@ -19,12 +19,7 @@ GAP: Shown[int] = 8
 
 
 def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequence[Convention]) -> np.ndarray:
-    """Some frames, one a row, with the mesh's edges as each of the conventions (one a column) places them.
-
-    Returns
-    -------
-    (height, width, 3) uint8
-    """
+    """Some frames, one a row, with the mesh's edges as each convention (one a column) has them, (h, w, 3) uint8."""
     rays = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     chosen = np.unique(np.linspace(0, len(capture.frames) - 1, ROWS + 2).round().astype(int)[1:-1])
     rows = []
@@ -46,13 +41,10 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
 
 def _beside(images: Sequence[np.ndarray], axis: int) -> np.ndarray:
     """Images in a row (axis 1) or column (axis 0), on black where sizes differ."""
-    other_axis = 1 - axis
-    extent = max(image.shape[other_axis] for image in images)
-    padded = []
-    for image in images:
-        pad = [(0, 0), (0, 0), (0, 0)]
-        pad[other_axis] = (0, extent - image.shape[other_axis])
-        pad[axis] = (0, GAP)
-        padded.append(np.pad(image, pad))
-    mosaic = np.concatenate(padded, axis)
-    return mosaic[:-GAP] if axis == 0 else mosaic[:, :-GAP]
+    sizes = np.array([image.shape[:2] for image in images])
+    sizes[:, 1 - axis] = sizes[:, 1 - axis].max()
+    sizes[:-1, axis] += GAP
+    mosaic = [np.zeros((height, width, 3), np.uint8) for height, width in sizes]
+    for part, image in zip(mosaic, images, strict=True):
+        part[: image.shape[0], : image.shape[1]] = image
+    return np.concatenate(mosaic, axis)

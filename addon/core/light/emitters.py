@@ -135,12 +135,9 @@ class BrightPoints:
 
 
 def sample_bright(bright: BrightTriangles, cube: np.ndarray) -> BrightPoints:
-    """Draw k points for each of n receivers.
+    """Draw k points for each of n receivers, by numbers ((n, k, 3) float32) in [0, 1): which triangle, and where on it.
 
-    Parameters
-    ----------
-    cube : (n, k, 3) float32
-        In [0, 1): which triangle, and where on it. Well spread in all three together, they spread over each lamp too.
+    Well spread in all three together, they spread over each lamp too.
     """
     flat = cube.reshape(-1, 3)
     index = np.minimum(np.searchsorted(bright.reached, flat[:, 0]), len(bright) - 1)

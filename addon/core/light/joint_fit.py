@@ -169,10 +169,7 @@ def solve_for_some(
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """As `solve`; sources that are not `believed` keep their lower bound, and the others are solved for once more.
 
-    Parameters
-    ----------
-    believed : callable
-        Of radiances and factor ((k + s, 3)), the sources that may have them, (k + s,) bool.
+    `believed` gives, of radiances and factor ((k + s, 3)), the sources that may have them, (k + s,) bool.
     """
     free, radiance = np.ones(len(unknown.lower), bool), unknown.lower.copy()
     while True:

@@ -62,12 +62,7 @@ class Lamp:
 def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:
     """Objects whose albedo pi L_d / E would have to be above `emitter_albedo`.
 
-    Parameters
-    ----------
-    object_id : (m,) int
-        Of a sample of elements.
-    radiance, irradiance : (m, 3) float32
-        L_d and E there.
+    By a sample of elements: their objects ((m,) int), L_d and E there ((m, 3) float32 each).
     """
     luminance, received = radiance @ LUMINANCE, irradiance @ LUMINANCE
     lamps = []
@@ -104,10 +99,7 @@ class LampKinds:
 def lamp_kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> LampKinds:
     """Classes as the capture gives them, and as models those of a class that are of about one size.
 
-    Parameters
-    ----------
-    noise : float
-        That a scan had along its normals, in metres.
+    A scan's `noise` along its normals (metres) is allowed for.
     """
     size, class_of = radius_of_gyration(mesh), class_names(instances)
     kinds = LampKinds(class_of, {number: number for number in class_of})
@@ -160,15 +152,10 @@ def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: LampKind
 
 
 def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
-    """Seen lamps whose radiance no pixel shows unmixed.
+    """Seen lamps whose radiance no pixel shows unmixed; `clean` as in `of_shining_class`.
 
     Their pixels hold what is beside them as well. So such a lamp's radiance is to be solved for, too, and what only
     stands beside one is none.
-
-    Parameters
-    ----------
-    clean : (m,) int
-        As in `of_shining_class`.
     """
     shown_objects = set(np.unique(clean).tolist())
     return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown_objects]

@@ -63,15 +63,11 @@ def reflect(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 
 def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
-    """The mesh's vertices with those of mirrors put where the room that they show says that their planes lie.
+    """The mesh's vertices with those of mirrors put where what they show says that their planes lie, (v, 3) float64.
 
     A renderer reflects at the mesh's own triangles, which a scan's noise turns by some tenths of a degree; what a
     mirror shows moves by twice that. Its direction follows from what it shows (`passes.mirrors.flat_mirrors`), how
     far off it lies by its vertices. A mirror that is one side of a sheet (`Mesh.backs`) stays as it is.
-
-    Returns
-    -------
-    (v, 3) float64
     """
     normal, area = mesh.geometry
     vertices = mesh.vertices.copy()

@@ -21,13 +21,7 @@ BLOCK: Block[int] = 1 << 16
 
 
 class TexelBlocks:
-    """Blocks over some of the atlas's elements.
-
-    Parameters
-    ----------
-    element : (m,) int
-        Those wanted; results are in their order.
-    """
+    """Blocks over some of the atlas's elements, (m,) int; results are in their order."""
 
     def __init__(self, atlas: Atlas, element: np.ndarray, threads: int = 0):
         self._size, self._threads = atlas.size, threads

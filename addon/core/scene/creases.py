@@ -62,13 +62,7 @@ def _angles(mesh: Mesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
-    """Relative standard error of the irradiance for nearby creases, (n,) float32.
-
-    Parameters
-    ----------
-    texel : float
-        Edge of an element in metres.
-    """
+    """Relative standard error of the irradiance for nearby creases, (n,) float32; an element is `texel` metres wide."""
     angles = edge_angles(mesh, np.bincount(atlas.triangle, minlength=len(mesh.triangles)) > 0)
     relative_error = np.zeros(len(atlas), np.float32)
     bent = np.flatnonzero((angles > 0.01 * CREASES.knee).any(1)[atlas.triangle])

@@ -314,15 +314,7 @@ class ElementLookup:
         return self._atlas.padding.take(np.minimum(row, size - 1) * size + np.minimum(column, size - 1))
 
     def __call__(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The element at each point, (n,) int32.
-
-        Parameters
-        ----------
-        triangle : (n,) int32
-            All >= 0.
-        u, v : (n,) float32
-            Barycentric coordinates of the second and third corner.
-        """
+        """The element at each point, (n,) int32, by triangle (>= 0) and barycentric coordinates as in `rays.Hits`."""
         element = self._texel(triangle, u, v)
         close = np.flatnonzero(self._close.take(triangle))
         foreign = close[self._atlas.object_id[element[close]] != self._object_id[triangle[close]]]

@@ -62,10 +62,7 @@ def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
 class SampleCollector:
     """Takes a frame's observations, keeps those of the chosen elements.
 
-    Parameters
-    ----------
-    triangle_normal : (t, 3) float32, optional
-        The mesh's, where views are handed over that show how the surface turns within their pixels.
+    With `triangle_normal` ((t, 3) float32) and views it is kept how the surface turns within their pixels.
     """
 
     def __init__(self, atlas: Atlas, frames: int, seed: int, triangle_normal: np.ndarray | None = None):

@@ -99,10 +99,7 @@ def colours(
 ) -> RadianceBeyond:  # fmt: skip
     """What frames show of what no mesh holds.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-        Places of the mesh, by which frames' gains are divided out.
+    By the `points` of the mesh, with their `normals` ((n, 3) float each), frames' gains are divided out.
     """
     value, clipped = np.full((len(sight.place), 3), np.nan), np.zeros(len(sight.place), bool)
     used, views = np.unique(sight.frame), np.zeros(len(points))

@@ -27,13 +27,9 @@ def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -
 
 
 def pixel_edges(camera: Camera, pixels: np.ndarray, hits: Hits) -> np.ndarray:
-    """Edge in metres of the surface that each pixel covers where it is met head-on, (n,) float32; NaN: unknown.
+    """Edge in metres of what each pixel ((n, 2) float), with the hit of its ray, covers where it is met head-on.
 
-    Parameters
-    ----------
-    pixels : (n, 2) float
-    hits : Hits
-        Of their rays.
+    (n,) float32; NaN: unknown.
     """
     if camera.lens is None:
         return hits.distance / np.float32(np.sqrt(camera.fx * camera.fy))

@@ -26,16 +26,6 @@ def tangent_frame(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def to_world(local: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Turn local directions so that +Z becomes the normal.
-
-    Parameters
-    ----------
-    local : (n, k, 3) or (1, k, 3) float32
-    normal : (n, 3) float32
-
-    Returns
-    -------
-    (n, k, 3) float32
-    """
+    """Turn local directions, (n, k, 3) or (1, k, 3), so that +Z becomes the normal, (n, 3): (n, k, 3) float32."""
     tangent, bitangent = tangent_frame(normal)
     return local[..., 0:1] * tangent[:, None] + local[..., 1:2] * bitangent[:, None] + local[..., 2:3] * normal[:, None]

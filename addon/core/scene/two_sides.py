@@ -87,17 +87,9 @@ def substantial(mesh: Mesh, both: np.ndarray) -> np.ndarray:
 
 
 def with_backs(mesh: Mesh, chosen: np.ndarray) -> Mesh:
-    """The mesh with a second side for some of its triangles; itself for none.
+    """The mesh with a second side for some of its triangles ((s,) int, sorted); itself for none.
 
-    Parameters
-    ----------
-    chosen : (s,) int
-        Sorted.
-
-    Returns
-    -------
-    Mesh
-        Its last s triangles are those of `chosen` turned over, on vertices of their own in the same places.
+    Its last s triangles are those of `chosen` turned over, on vertices of their own in the same places.
     """
     if not len(chosen):
         return mesh
@@ -124,19 +116,9 @@ def fronts(mesh: Mesh) -> tuple[Mesh, np.ndarray]:
 
 
 def laid_apart(mesh: Mesh, vertices: np.ndarray) -> Mesh:
-    """The mesh with a gap between its sheets' two sides, as a renderer needs it.
+    """The mesh with a gap between its sheets' two sides (`with_backs`), as a renderer needs it.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        See `with_backs`.
-    vertices : (v, 3) float64
-        Where the vertices of its first sides are wanted.
-
-    Returns
-    -------
-    Mesh
-        First sides lie where they lay; each second one has three vertices of its own.
+    First sides lie where their `vertices` ((v, 3) float64) are wanted; each second one has three vertices of its own.
     """
     single, _ = fronts(mesh)
     if mesh.backs is None:

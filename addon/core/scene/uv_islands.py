@@ -9,16 +9,9 @@ from .weld import same_place
 
 
 def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Number the corners so that two have one number where they share vertex and texture coordinate.
+    """Number the corners of triangles ((t, 3) int) so that two have one number where vertex and `uv` are the same.
 
-    Parameters
-    ----------
-    triangles : (t, 3) int
-    uv : (t, 3, 2) float32
-
-    Returns
-    -------
-    (t, 3) int64
+    (t, 3) int64; `uv` is (t, 3, 2) float32.
     """
     bits = np.ascontiguousarray(uv, np.float32).view(np.int32).reshape(-1, 2)
     return same_place(np.column_stack([triangles.ravel(), bits]))[1].reshape(-1, 3)
@@ -31,18 +24,9 @@ def components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarray:
-    """Number the connected pieces of triangles that share a corner and a label.
+    """Number the connected pieces of triangles that share a corner (`corner_ids`) and, if given, a label ((t,) int64).
 
-    Parameters
-    ----------
-    corners : (t, 3) int64
-        See `corner_ids`.
-    label : (t,) int64, optional
-        Triangles of different labels never connect.
-
-    Returns
-    -------
-    (t,) int64, each number from 0 on in use
+    (t,) int64, each number from 0 on in use.
     """
     if label is not None:
         corners = corners + label[:, None] * (corners.max(initial=0) + 1)
