@@ -24,7 +24,7 @@ from ..passes.specular.given import fit_given
 from ..passes.specular.intervals import GlossInterval, gloss_interval
 from ..passes.specular.models import Choice, choose_model, set_apart
 from ..passes.specular.of_class import adopt_from_class, share_paint
-from ..passes.specular.one_colour import Coated, OneColour, compare, compare_coat
+from ..passes.specular.one_colour import OneColour, compare, compare_coat
 from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..progress import Progress
@@ -112,7 +112,7 @@ class Looked:
     target: int
 
 
-LOOKED = {cls.__name__: cls for cls in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour, Coated)}
+LOOKED = {cls.__name__: cls for cls in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour)}
 """What a stored `Looked` may hold."""
 
 

@@ -15,7 +15,7 @@ from ...fit.params import LOBE_FIT
 from ...fit.problem import Problem
 from ...significance import LEVELS, SIGMA_OF_MAD
 from .models import Choice, metal_f0, reflectance
-from .one_colour import Coated, OneColour
+from .one_colour import OneColour
 from .params import LOOKS
 
 
@@ -31,29 +31,29 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     # receives, but for the light's error: a white bowl under a lamp had 2.1.
     if not MAX_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
-    fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.metal, looks.diffuse)
+    fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.spread, looks.diffuse)
     if looks.sigmas < LEVELS.sigmas:
         return replace(choice, metal=choice.metal or fit)
     note = (
-        f"Its radiance spreads by {looks.metal:.2f} about a metal's, by {looks.other:.2f} about that of anything else "
+        f"Its radiance spreads by {looks.spread:.2f} about a metal's, by {looks.other:.2f} about that of anything else "
         "of one colour."
     )
     return replace(choice, model=METAL, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
 
 
-def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
+def coated_by_looks(choice: Choice, looks: OneColour) -> Choice:
     """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
     min_diffuse, max_coated = LOOKS.coated_spread
     if (
         looks.diffuse < min_diffuse
-        or looks.coated > max_coated
+        or looks.spread > max_coated
         or looks.ratio > LOOKS.ratio
         or looks.sigmas < LEVELS.sigmas
     ):
         return choice
-    fit = _fit(looks.phi, np.full(3, TYPICAL_F0), looks.coated, looks.diffuse)
+    fit = _fit(looks.phi, np.full(3, TYPICAL_F0), looks.spread, looks.diffuse)
     note = (
-        f"Its radiance spreads by {looks.coated:.2f} about that of one colour under a coat, by {looks.diffuse:.2f} "
+        f"Its radiance spreads by {looks.spread:.2f} about that of one colour under a coat, by {looks.diffuse:.2f} "
         "about a diffuse one's."
     )
     return replace(choice, model=DIELECTRIC, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)

@@ -15,7 +15,7 @@ from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
 from ...significance import LEVELS, SIGMA_OF_MAD
-from .one_colour import Coated, OneColour
+from .one_colour import OneColour
 from .params import CHOICE, FIT
 
 
@@ -47,7 +47,7 @@ class Choice:
     """A metal's lobe that fits better than any other model, but not significantly."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
-    looks: OneColour | Coated | None = None
+    looks: OneColour | None = None
     """The comparison that makes it metal or coated, where its views alone do not (`by_looks`)."""
 
     @property
@@ -85,12 +85,6 @@ def _gain_of_metal(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, f
         return gain, sigmas
     ranks = wilcoxon(without - with_lobe, alternative="greater", method="asymptotic")
     return gain, max(sigmas, float(ranks.zstatistic))
-
-
-def gain_of(fit: LobeFit, held_out: Problem) -> tuple[float, float]:
-    """Share of the cost that a fit's lobe saves on held-out elements, and the same in standard errors."""
-    dense, scale = _weighted(DenseProblem(held_out), fit)
-    return _gain(*element_costs(dense, fit, scale))
 
 
 def _weighted(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
@@ -214,11 +208,15 @@ def set_apart(choice: Choice, see_through: SeeThrough, sure: bool) -> Choice:
     return Choice(TRANSPARENT, None, see_through.gain, see_through.sigmas, note, scores, see_through=see_through)
 
 
-def may_be_bare(problem: Problem, fit: LobeFit) -> bool:
-    """Whether a metal's lobe, with nothing of each element's own, costs no more than `CHOICE.bare` allows."""
+def contradicts(problem: Problem, fit: LobeFit, model: Brdf) -> bool:
+    """Whether frames speak against a lobe that others have, or against its having nothing beside it, as a metal has."""
     dense, scale = _weighted(DenseProblem(problem), fit)
-    _, diffuse = element_costs(dense, fit, scale)
-    return bool(_bare_metal(problem, dense, fit.phi, fit, scale)[1].sum() <= CHOICE.bare * diffuse.sum())
+    with_lobe, diffuse = element_costs(dense, fit, scale)
+    if _gain(with_lobe, diffuse)[0] < -LEVELS.gain:
+        return True
+    if not model.lobe_alone:
+        return False
+    return not _bare_metal(problem, dense, fit.phi, fit, scale)[1].sum() <= CHOICE.bare * diffuse.sum()
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:

@@ -12,8 +12,7 @@ from ...fit.lobe_fit import LobeFit
 from ...fit.problem import Problem
 from ...significance import LEVELS
 from ...weighted import weighted_median
-from .models import Choice, gain_of, is_dielectric, may_be_bare, own_or_class_lobe
-from .one_colour import Coated
+from .models import Choice, contradicts, is_dielectric, own_or_class_lobe
 from .params import CHOICE, GIVEN
 
 
@@ -40,7 +39,8 @@ def adopt_from_class(
         glossy = {i: choice for i, choice in members.items() if choice.model.has_lobe}
         if not glossy:
             continue
-        judges = {i: choice for i, choice in glossy.items() if not isinstance(choice.looks, Coated)} or glossy
+        # One that looks coated is no judge.
+        judges = {i: c for i, c in glossy.items() if c.looks is None or c.model.lobe_alone} or glossy
         clear = {
             i for i, choice in judges.items() if not (choice.dielectric if choice.model.lobe_alone else choice.metal)
         }
@@ -180,7 +180,7 @@ def _pooled(choices: list[Choice], best: Choice) -> Choice:
 
 
 def _contradicted(shared: Choice, own_lobe: LobeFit | None, problem: Problem | None) -> bool:
-    """Whether an object's own frames contradict its class's lobe, or that it has nothing but that, as a metal has."""
+    """Whether an object's own frames contradict its class's lobe."""
     if problem is None or len(np.unique(problem.element)) < LEVELS.few:
         return False
     lobe = shared.lobe
@@ -189,6 +189,4 @@ def _contradicted(shared: Choice, own_lobe: LobeFit | None, problem: Problem | N
         lobe = replace(
             lobe, kappa=own_lobe.kappa, kappa_lambertian=own_lobe.kappa_lambertian, residual=own_lobe.residual
         )
-    if gain_of(lobe, problem)[0] < -LEVELS.gain:
-        return True
-    return shared.model.lobe_alone and not may_be_bare(problem, lobe)
+    return contradicts(problem, lobe, shared.model)

@@ -24,66 +24,36 @@ from .params import FIT
 
 @dataclass(frozen=True)
 class OneColour:
-    """How well each model, of one colour, explains an object's frames.
+    """How well one colour explains an object's frames, as a metal (`compare`) or under a coat (`compare_coat`).
 
     Attributes
     ----------
-    diffuse, dielectric, metal : float
-        Robust standard deviation of log(I / prediction).
+    diffuse, other, spread : float
+        Robust standard deviation of log(I / prediction): of a diffuse surface; of the best that a lobe is compared
+        with, which for a metal may be a dielectric; and with the lobe.
     phi : float
-        Width of the metal's lobe.
+        Width of the lobe.
     sigmas : float
-        By how many standard errors over the elements the metal explains more than the better of the others.
+        By how many standard errors over the elements the lobe explains more.
     """
 
     diffuse: float
-    dielectric: float
-    metal: float
-    phi: float
-    sigmas: float
-
-    @property
-    def other(self) -> float:
-        """Spread of the better one of the others."""
-        return min(self.diffuse, self.dielectric)
-
-    @property
-    def ratio(self) -> float:
-        """The metal's spread over that; below 1 favours metal."""
-        return self.metal / self.other
-
-
-@dataclass(frozen=True)
-class Coated:
-    """How well one colour explains an object's frames in all channels, diffuse and under a dielectric's coat.
-
-    Attributes
-    ----------
-    diffuse, coated : float
-        Robust standard deviation of log(I / prediction) over observations and channels.
-    phi : float
-        Width of the coat's lobe.
-    sigmas : float
-        By how many standard errors over the elements the coat explains more.
-    """
-
-    diffuse: float
-    coated: float
+    other: float
+    spread: float
     phi: float
     sigmas: float
 
     @property
     def ratio(self) -> float:
-        """The coated spread over the diffuse one; below 1 favours a coat."""
-        return self.coated / self.diffuse
+        """The spread with the lobe over the best without; below 1 favours it."""
+        return self.spread / self.other
 
 
 def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
-    """Compare the three on an object's observations; None where there are too few.
+    """Compare diffuse, dielectric and metal on an object's observations; None where there are too few.
 
     Parameters
     ----------
-    problem : Problem
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
@@ -103,26 +73,11 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
     coats = (_one_colour(radiance, E, _coat(problem, at)[usable]) for at in widths)
     dielectric = min((residual(predicted @ LUMINANCE) for predicted in coats), key=spread)
     metals = [residual(light.A[usable, at] @ LUMINANCE) for at in widths]
-    best = int(np.argmin([spread(log_ratio) for log_ratio in metals]))
-    other, metal = min(diffuse, dielectric, key=spread), metals[best]
-    return OneColour(
-        spread(diffuse),
-        spread(dielectric),
-        spread(metal),
-        float(light.grid[widths[best]]),
-        _sigmas(metal, other, element),
-    )
+    return _compared(diffuse, min(diffuse, dielectric, key=spread), metals, light.grid[widths], element)
 
 
-def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
-    """Compare diffuse and coated on an object's observations, by channel; None where there are too few.
-
-    Parameters
-    ----------
-    problem : Problem
-    irradiance : (n, 3) float32
-        E of each element of the surface.
-    """
+def compare_coat(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
+    """Compare diffuse and coated on an object's observations, by channel; parameters and None as in `compare`."""
     observations = _usable(problem, irradiance)
     if observations is None:
         return None
@@ -137,13 +92,17 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
 
     diffuse = residual(_one_colour(radiance, E, np.zeros(1, np.float32)))
     coats = [residual(_one_colour(radiance, E, _coat(problem, at)[usable])) for at in widths]
-    best = int(np.argmin([spread(log_ratio) for log_ratio in coats]))
-    return Coated(
-        spread(diffuse),
-        spread(coats[best]),
-        float(problem.light.grid[widths[best]]),
-        _sigmas(coats[best], diffuse, element),
-    )
+    return _compared(diffuse, diffuse, coats, problem.light.grid[widths], element)
+
+
+def _compared(
+    diffuse: np.ndarray, other: np.ndarray, by_width: list[np.ndarray], phi: np.ndarray, element: np.ndarray
+) -> OneColour:
+    """The lobe that leaves the least residuals, of one of each width `phi`, against what others leave."""
+    spreads = [spread(residual) for residual in by_width]
+    best = int(np.argmin(spreads))
+    sigmas = _sigmas(by_width[best], other, element)
+    return OneColour(spread(diffuse), spread(other), spreads[best], float(phi[best]), sigmas)
 
 
 def _usable(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:

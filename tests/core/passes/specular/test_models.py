@@ -10,11 +10,12 @@ import pytest
 from addon.core.brdf.dielectric import DIELECTRIC, MAX_F0
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
-from addon.core.fit.lobe_fit import fit_lobe
+from addon.core.fit.lobe_fit import element_costs, fit_lobe
+from addon.core.fit.problem import DenseProblem
 from addon.core.passes.specular import models, of_class
-from addon.core.passes.specular.models import Choice, choose_model, gain_of, metal_f0
+from addon.core.passes.specular.models import Choice, choose_model, metal_f0
 from addon.core.passes.specular.of_class import adopt_from_class, share_paint
-from addon.core.passes.specular.one_colour import Coated
+from addon.core.passes.specular.one_colour import OneColour
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import Box
 
@@ -99,7 +100,9 @@ def test_no_lobe_saves_more_than_there_is(seen):
     for name in ("glossy", "metal"):
         light = seen[name].light
         noisy = replace(seen[name], light=replace(light, A_noise=30 * light.A_noise, B_noise=30 * light.B_noise))
-        assert gain_of(replace(fit, psi=np.full(3, 0.3)), noisy)[0] <= 1
+        strong = replace(fit, psi=np.full(3, 0.3))
+        dense, scale = models._weighted(DenseProblem(noisy), strong)
+        assert models._gain(*element_costs(dense, strong, scale))[0] <= 1
 
 
 def test_a_metals_colour(seen):
@@ -225,7 +228,7 @@ def test_what_looks_coated_takes_its_classs_lobe(seen):
     """Its frames fit a narrower lobe better. Where looks alone said that it is coated they don't defend that against
     what views tell of another of its class; where views did, or nobody's do, it stays."""
     own = choose_model(seen["glossy"])
-    looks = Coated(0.3, 0.2, own.fit.phi, 4.0)
+    looks = OneColour(0.3, 0.3, 0.2, own.fit.phi, 4.0)
     broad = replace(own, fit=replace(own.fit, phi=0.5), sigmas=3 * own.sigmas)
     for looks_of_it, looks_of_other, phi in (
         (looks, None, 0.5),
@@ -241,7 +244,7 @@ def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
     """How the diffuse part darkens towards grazing views is an object's own matter, with a lobe as without one."""
     sure, diffuse = choose_model(seen["glossy"]), choose_model(seen["diffuse"])
     asked = []
-    monkeypatch.setattr(of_class, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
+    monkeypatch.setattr(of_class, "contradicts", lambda problem, fit, model: bool(asked.append(fit)))
     own = replace(diffuse, fit=replace(diffuse.fit, kappa=0.6))
     source = replace(sure, fit=replace(sure.fit, kappa=0.3))
     result = adopt_from_class({0: source, 1: own}, {1: seen["diffuse"]}, {0: "floor", 1: "floor"})

@@ -78,7 +78,7 @@ def test_what_follows_matt_light_stays_matt(floor, irradiance):
     """A spread that errors of E explain says nothing, however much smaller the metal's is."""
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
-    flat = replace(looks, diffuse=0.12, dielectric=0.12, metal=0.03)
+    flat = replace(looks, diffuse=0.12, other=0.12, spread=0.03)
     assert metal_by_looks(UNSURE, flat, problem) is UNSURE
 
 
@@ -144,7 +144,7 @@ def test_nothing_matt_is_coated(floor, irradiance):
 def test_what_a_coat_does_not_explain_either(floor, irradiance):
     """A cord as thick as a pixel shows its background: coated it is off by less, but by far too much."""
     looks = compare_coat(floor(0.11, 0.04, LEAF), irradiance)
-    assert coated_by_looks(UNSURE, replace(looks, diffuse=0.65, coated=0.4)) is UNSURE
+    assert coated_by_looks(UNSURE, replace(looks, diffuse=0.65, other=0.65, spread=0.4)) is UNSURE
 
 
 def test_a_coat_by_looks_gives_way_to_one_by_views(floor, irradiance):
