@@ -17,7 +17,7 @@ Last, what lies in flat parts is put into their planes (`planes`), which angles 
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
@@ -30,45 +30,28 @@ from ...scene.params import NOISE
 from ...scene.weld import one_place, point_normals, ring_of, welded
 from ...significance import LEVELS
 from .params import DENOISE
-from .planes import onto_sheets
+from .planes import onto_sheets, paired
 
 SCALES = np.geomspace(0.5, 0.02, 8)
 """Radians, one for each step."""
 
 
-@dataclass(frozen=True)
-class Hinges:
-    """The e edges at which just two triangles meet, as points: the edge's ends, and what lies opposite on either side.
+def hinges_of(faces: np.ndarray) -> np.ndarray:
+    """The points a, b, c, d of the edges a-b at which just two triangles meet, a-b-c and a-b-d however wound, (4, e).
 
-    Attributes
-    ----------
-    a, b, c, d : (e,) int
-        Edge a-b; triangles a-b-c and a-b-d, whatever their windings.
+    Borders and edges where three or more meet are left out.
     """
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    d: np.ndarray
-
-
-def hinges_of(faces: np.ndarray) -> Hinges:
-    """Edges with just two triangles; borders and edges where three or more meet are left out."""
     corners = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])
-    low, high = np.minimum(corners[:, 0], corners[:, 1]), np.maximum(corners[:, 0], corners[:, 1])
-    key = low.astype(np.int64) * (int(faces.max()) + 1) + high
-    order = np.argsort(key, kind="stable")
-    key, opposite = key[order], corners[order, 2]
-    start = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
-    start = start[np.diff(np.r_[start, len(key)]) == 2]
-    start = start[opposite[start] != opposite[start + 1]]  # a triangle listed twice
-    return Hinges(low[order][start], high[order][start], opposite[start], opposite[start + 1])
+    first, second = paired(corners[:, :2])
+    c, d = corners[first, 2], corners[second, 2]
+    hinges = np.stack([*np.sort(corners[first, :2], 1).T, c, d])
+    return hinges[:, c != d]  # not a triangle listed twice
 
 
 def dihedral(
-    points: np.ndarray, hinges: Hinges, floor: float = 0.0
+    points: np.ndarray, hinges: np.ndarray, floor: float = 0.0
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """The angle at each hinge, and how it changes with the points.
+    """The angle at each hinge (`hinges_of`), and how it changes with the points.
 
     Parameters
     ----------
@@ -82,8 +65,9 @@ def dihedral(
     gradient : four (e, 3) arrays
         Of theta by the points a, b, c and d, radians per metre (Bridson et al. 2003).
     """
-    start = points[hinges.a]
-    edge = points[hinges.b] - start
+    a, b, c, d = hinges
+    start = points[a]
+    edge = points[b] - start
     squared = np.maximum((edge**2).sum(1), 1e-18)
     along = edge / np.sqrt(squared)[:, None]
 
@@ -95,8 +79,8 @@ def dihedral(
         height = np.linalg.norm(arm, axis=1)
         return foot[:, None], arm / np.maximum(height, 1e-12)[:, None], np.maximum(height, max(floor, 1e-12))[:, None]
 
-    foot_c, arm_c, height_c = side(hinges.c)
-    foot_d, arm_d, height_d = side(hinges.d)
+    foot_c, arm_c, height_c = side(c)
+    foot_d, arm_d, height_d = side(d)
     # Turned alike by the edge, not by the windings.
     normal_c, normal_d = np.cross(along, arm_c), np.cross(arm_d, along)
     theta = np.arctan2((np.cross(normal_c, normal_d) * along).sum(1), (normal_c * normal_d).sum(1))
@@ -107,16 +91,15 @@ def dihedral(
 
 
 def _normal_equations(
-    points: np.ndarray, normal: np.ndarray, hinges: Hinges, noise: float, scale: float
+    points: np.ndarray, normal: np.ndarray, hinges: np.ndarray, noise: float, scale: float
 ) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:
     """Angles, their weights, their Jacobian by each point's step along its normal, and the normal equations' matrix."""
     count = len(points)
     theta, gradient = dihedral(points, hinges, noise)
     weight = 1 / (scale**2 + theta**2)
-    ends = (hinges.a, hinges.b, hinges.c, hinges.d)
-    values = np.concatenate([(derivative * normal[point]).sum(1) for derivative, point in zip(gradient, ends)])
+    values = np.concatenate([(derivative * normal[point]).sum(1) for derivative, point in zip(gradient, hinges)])
     rows = np.tile(np.arange(len(theta)), 4)
-    jacobian = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
+    jacobian = sparse.csr_matrix((values, (rows, hinges.ravel())), (len(theta), count))
     system = sparse.diags(np.full(count, 1 / noise**2)) + jacobian.T @ sparse.diags(weight) @ jacobian
     return theta, weight, jacobian, system.tocsr()
 

@@ -54,16 +54,21 @@ class Moments:
         return self.origin + mean, axes.T, np.maximum(scatter, 1e-18)
 
 
+def paired(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first and the second of edges ((m, 2) int) that are listed just twice, whichever way round, (k,) int each."""
+    low, high = edges.min(1), edges.max(1)
+    key = low.astype(np.int64) * (int(edges.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    start = np.flatnonzero(np.r_[True, key[order][1:] != key[order][:-1]])
+    start = start[np.diff(np.r_[start, len(order)]) == 2]
+    return order[start], order[start + 1]
+
+
 def neighbours_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The triangle across each edge, (t, 3), -1 where there is not just one; and 1 or -1: wound alike or not."""
     count = len(faces)
     edges = np.stack([faces, faces[:, [1, 2, 0]]], 2).reshape(-1, 2)
-    low, high = edges.min(1), edges.max(1)
-    key = low.astype(np.int64) * (int(faces.max()) + 1) + high
-    order = np.argsort(key, kind="stable")
-    start = np.flatnonzero(np.r_[True, key[order][1:] != key[order][:-1]])
-    start = start[np.diff(np.r_[start, len(order)]) == 2]
-    first, second = order[start], order[start + 1]
+    first, second = paired(edges)
     across, winding = np.full(3 * count, -1), np.ones(3 * count, np.int8)
     across[first], across[second] = second // 3, first // 3
     winding[first] = winding[second] = np.where(edges[first, 0] == edges[second, 0], -1, 1)

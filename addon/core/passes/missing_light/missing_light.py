@@ -90,12 +90,12 @@ def find_missing_light(
     """
     atlas, windows = field.atlas, np.zeros(CELLS, bool) if windows is None else windows
     radiance = filled_radiance(field)
-    masks = {patch: atlas.object_id == patch for patch in patches}
-    bound = {patch: np.median(radiance[mask], 0).astype(np.float64) for patch, mask in masks.items()}
+    masks = [atlas.object_id == patch for patch in patches]
+    bounds = np.reshape([np.median(radiance[mask], 0).astype(np.float64) for mask in masks], (-1, 3))
     shut = unseen_closing(field)
     sunlit = np.zeros(len(atlas), bool) if sunlit is None else sunlit
     hidden = np.isin(atlas.object_id, patches) | shut | sunlit
-    element = _sample(field, good & ~hidden, seed)
+    element = spread_over(field, np.flatnonzero(good & ~hidden), LEVELS.sample, np.random.default_rng(seed))
     by_sun = _by_sun(field, radiance, sunlit, element, seed)
     radiance[hidden] = 0
     lit_by_known = field.with_openings(None).with_light(radiance, Environment.dark())
@@ -105,7 +105,7 @@ def find_missing_light(
     cell, through, from_sky, by_part = _through_cells(field, part, shut, windows, element, seed)
     received = received + from_sky
     by_patch = contributions(field, element, [[patch] for patch in patches], seed)
-    lamp_of = same_lamps(atlas, list(masks.values()))
+    lamp_of = same_lamps(atlas, masks)
     daylight = _daylight(np.median(radiance[element], 0).astype(np.float64))
     # What hardly any element sees says nothing, and lights nothing.
     usable_cells, usable_parts = (contribution.mean(0) >= MISSING.least_seen for contribution in (through, by_part))
@@ -115,7 +115,6 @@ def find_missing_light(
         + through[:, ~usable_cells].sum(1)[:, None] * daylight
         + by_part[:, ~usable_parts] @ level[~usable_parts]
     )
-    bounds = np.reshape(list(bound.values()), (-1, 3))
     patch_bounds = np.reshape([np.median(bounds[w > 0] / w[w > 0, None], 0) for w in lamp_of.T], (-1, 3))
     lower_bounds, cells = np.concatenate([patch_bounds, level[usable_parts]]), int(usable_cells.sum())
     by_white = np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1)
@@ -128,7 +127,7 @@ def find_missing_light(
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
-    in_sun = np.array([_mostly_lit(field, mask) for mask in masks.values()], bool)
+    in_sun = np.array([_mostly_lit(field, mask) for mask in masks], bool)
 
     def shines(of_lamp: np.ndarray) -> np.ndarray:
         """The patches that send clearly more than was measured, and not as the sun lights them, (p,) bool."""
@@ -225,11 +224,6 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
             free[alike] = False
             lamps.append(np.where(alike, area[alike].mean() / area, 0))
     return np.reshape(lamps, (len(lamps), len(patches))).T
-
-
-def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
-    """Good elements, spread over the surface."""
-    return spread_over(field, np.flatnonzero(good), LEVELS.sample, np.random.default_rng(seed))
 
 
 def unseen_closing(field: LightField) -> np.ndarray:

@@ -31,7 +31,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     # receives, but for the light's error: a white bowl under a lamp had 2.1.
     if not MAX_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
-    fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.spread, looks.diffuse)
+    fit = _fit(looks, metal_f0(problem, looks.phi))
     if looks.sigmas < LEVELS.sigmas:
         return replace(choice, metal=choice.metal or fit)
     note = (
@@ -44,14 +44,11 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
 def coated_by_looks(choice: Choice, looks: OneColour) -> Choice:
     """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
     min_diffuse, max_coated = LOOKS.coated_spread
-    if (
-        looks.diffuse < min_diffuse
-        or looks.spread > max_coated
-        or looks.ratio > LOOKS.ratio
-        or looks.sigmas < LEVELS.sigmas
-    ):
+    if looks.diffuse < min_diffuse or looks.spread > max_coated:
         return choice
-    fit = _fit(looks.phi, np.full(3, TYPICAL_F0), looks.spread, looks.diffuse)
+    if looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.sigmas:
+        return choice
+    fit = _fit(looks, np.full(3, TYPICAL_F0))
     note = (
         f"Its radiance spreads by {looks.spread:.2f} about that of one colour under a coat, by {looks.diffuse:.2f} "
         "about a diffuse one's."
@@ -59,7 +56,6 @@ def coated_by_looks(choice: Choice, looks: OneColour) -> Choice:
     return replace(choice, model=DIELECTRIC, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
 
 
-def _fit(phi: float, psi: np.ndarray, spread: float, diffuse: float) -> LobeFit:
+def _fit(looks: OneColour, psi: np.ndarray) -> LobeFit:
     """The lobe as a fit; its residuals are median sizes, as `LobeFit` has them."""
-    residual, residual_lambertian = spread / SIGMA_OF_MAD, diffuse / SIGMA_OF_MAD
-    return LobeFit(phi, psi, 0.0, 0.0, residual, residual_lambertian)
+    return LobeFit(looks.phi, psi, 0.0, 0.0, looks.spread / SIGMA_OF_MAD, looks.diffuse / SIGMA_OF_MAD)

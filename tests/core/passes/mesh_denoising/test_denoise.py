@@ -75,7 +75,7 @@ def test_angle_changes_by_its_gradient():
     rng = np.random.default_rng(3)
     points = rng.normal(size=(4, 3))
     hinges = hinges_of(np.array([[0, 1, 2], [3, 0, 1]]))
-    assert [hinges.a.tolist(), hinges.b.tolist(), hinges.c.tolist(), hinges.d.tolist()] == [[0], [1], [2], [3]]
+    assert hinges.tolist() == [[0], [1], [2], [3]]
     theta, gradient = dihedral(points, hinges)
     for at, by in enumerate(gradient):
         for axis in range(3):
