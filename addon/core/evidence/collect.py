@@ -25,13 +25,8 @@ class Evidence:
 
 def collect(findings: Findings) -> Evidence:
     """The evidence of a finished recovery; E is gathered again at a few thousand elements."""
-    atlas, lit, albedo = findings.surface.atlas, findings.lit_diffuse, findings.albedo
-    intrinsic = without_light(atlas, lit, albedo)
-    light = light_evidence(
-        findings.field, findings.shading, lit, intrinsic, threads=findings.threads, seed=findings.seed
-    )
-    texels = texel_evidence(
-        atlas, lit, albedo, intrinsic, light, findings.materials, findings.specular, findings.irradiance
-    )
-    texels.albedo[np.isin(atlas.object_id, list(findings.coloured))] = 0
-    return Evidence(light, texels, object_evidence(atlas, lit, albedo, texels))
+    intrinsic = without_light(findings)
+    light = light_evidence(findings, intrinsic)
+    texels = texel_evidence(findings, intrinsic, light)
+    texels.albedo[np.isin(findings.surface.atlas.object_id, list(findings.coloured))] = 0
+    return Evidence(light, texels, object_evidence(findings, texels))

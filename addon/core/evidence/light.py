@@ -14,12 +14,11 @@ from ..kinds import Unit
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
-from ..light.shading import Shading
 from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
-from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import SATURATED
 from ..significance import LEVELS
+from .findings import Findings
 from .params import CALIBRATION
 
 RAYS: RayCounts = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
@@ -79,11 +78,12 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     return chosen, nearest.ravel()
 
 
-def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_error: np.ndarray) -> LightField:
+def unsure_light(findings: Findings, relative_error: np.ndarray) -> LightField:
     """The room with nothing but the light that no frame looked at.
 
     Channel 0: all of it; 1: that of surfaces, times its relative error; 2: the same of lamps and sky.
     """
+    field, shading, lit = findings.field, findings.shading, findings.lit_diffuse
     luminance = field.radiance @ LUMINANCE
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
     clipped = lit.tier == SATURATED
@@ -107,27 +107,24 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     return unseen_light.with_sun(sun).with_openings(openings)
 
 
-def light_evidence(
-    field: LightField, shading: Shading, lit: LitDiffuse, relative_error: np.ndarray, *, threads: int = 0, seed: int = 0
-) -> LightEvidence:
+def light_evidence(findings: Findings, relative_error: np.ndarray) -> LightEvidence:
     """Check E at some elements and carry its error over to all.
 
     Parameters
     ----------
-    field : LightField
-        The room as E was gathered in it.
     relative_error : (n,) float32
         Relative error of each element's albedo, the light aside.
     """
+    field, shading, lit, seed = findings.field, findings.shading, findings.lit_diffuse, findings.seed
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, LEVELS.sample, seed)
-    gather = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
+    gather = partial(irradiance, interpolate=False, finest=1.0, threads=findings.threads)
     log_E = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
     gathered = [gather(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - log_E, -CALIBRATION.worst, CALIBRATION.worst) for E in gathered)
     noise = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
-    unseen_light = unsure_light(field, shading, lit, relative_error)
+    unseen_light = unsure_light(findings, relative_error)
     shares = np.zeros((len(chosen), 3), np.float32)
     if unseen_light.radiance.any() or unseen_light.environment.radiance.any() or unseen_light.sun is not None:
         unseen_E = gather(unseen_light, chosen, **SHARE_RAYS, seed=seed + 7)[0]

@@ -7,9 +7,8 @@ import numpy as np
 from ..brdf.material import Z90
 from ..groups import by_label
 from ..luminance import rgb
-from ..passes.albedo.albedo import MEASURED, Albedo
-from ..scene.atlas import Atlas
-from ..scene.lit_diffuse import LitDiffuse
+from ..passes.albedo.albedo import MEASURED
+from .findings import Findings
 from .params import CALIBRATION
 from .texel import TexelEvidence
 
@@ -49,14 +48,13 @@ class ObjectEvidence:
     unseen_light: float
 
 
-def object_evidence(atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> list[ObjectEvidence]:
+def object_evidence(findings: Findings, texels: TexelEvidence) -> list[ObjectEvidence]:
     """One for each object that has elements, by object_id."""
-    return [_evidence_of(elements, atlas, lit, albedo, texels) for elements in by_label(atlas.object_id)]
+    return [_evidence_of(elements, findings, texels) for elements in by_label(findings.surface.atlas.object_id)]
 
 
-def _evidence_of(
-    elements: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence
-) -> ObjectEvidence:
+def _evidence_of(elements: np.ndarray, findings: Findings, texels: TexelEvidence) -> ObjectEvidence:
+    atlas, lit, albedo = findings.surface.atlas, findings.lit_diffuse, findings.albedo
     area = atlas.area[elements].astype(np.float64)
     seen, measured = lit.seen[elements], albedo.origin[elements] == MEASURED
     total = max(float(area.sum()), 1e-30)

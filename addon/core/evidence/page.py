@@ -11,6 +11,7 @@ from ..errors import BadInputError
 from ..io.png import data_address
 from ..kinds import Shown
 from ..photo import encoded
+from ..significance import LEVELS
 from .collect import Evidence
 from .colours import heat_css
 from .findings import Findings
@@ -127,7 +128,7 @@ def _objects(findings: Findings, evidence: Evidence) -> str:
 def _relative_width(evidence: ObjectEvidence) -> float:
     """Half the width of an albedo's interval, relative to the albedo."""
     width = np.mean(evidence.albedo_high) - np.mean(evidence.albedo_low)
-    return float(width / 2 / max(float(np.mean(evidence.albedo)), 0.02))
+    return float(width / 2 / max(float(np.mean(evidence.albedo)), LEVELS.dark))
 
 
 def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:

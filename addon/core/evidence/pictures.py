@@ -7,6 +7,7 @@ from scipy import ndimage
 
 from ..kinds import Shown
 from ..photo import encoded, photo
+from ..significance import LEVELS
 from .colours import NOTHING, gloss, heat
 from .findings import Findings
 from .texel import TexelEvidence
@@ -46,7 +47,7 @@ def pictures_of(findings: Findings, errors: TexelEvidence, view: View) -> tuple[
     median = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
     emitters = np.isin(view.object_id, list(findings.emitters))
 
-    relative = errors.albedo[index].mean(-1) / np.maximum(albedo[index].mean(-1), 0.02)
+    relative = errors.albedo[index].mean(-1) / np.maximum(albedo[index].mean(-1), LEVELS.dark)
     residual = view.residual
     worst = worst_blocks(residual, view.object_id)
     light = shading[index]

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..brdf.material import ObjectMaterial
 from ..groups import by_label, by_number
-from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.albedo.albedo import MEASURED
 from ..scene.atlas import Atlas
-from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import EDGE
+from .findings import Findings
 from .light import LightEvidence
 from .params import CALIBRATION
 
@@ -51,56 +50,41 @@ def contrast(atlas: Atlas, values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(squares / count - np.square(total / count), 0))
 
 
-def without_light(atlas: Atlas, lit: LitDiffuse, albedo: Albedo) -> np.ndarray:
+def without_light(findings: Findings) -> np.ndarray:
     """Relative error of albedo as far as it has nothing to do with light or gloss, (n,) float32.
 
     What no frame saw has the error of what it was filled in from, the spread of its object, and the more, the less of
     the object was measured.
     """
+    albedo = findings.albedo
     measured = albedo.origin == MEASURED
-    texture = CALIBRATION.texture * contrast(atlas, albedo.rho.mean(1))
+    texture = CALIBRATION.texture * contrast(findings.surface.atlas, albedo.rho.mean(1))
     error = np.square(CALIBRATION.own * albedo.error) + np.square(texture)
-    error += np.where(lit.tier == EDGE, np.float32(CALIBRATION.poorly**2), 0)
-    spread, common, share = by_object(atlas, albedo, error)
+    error += np.where(findings.lit_diffuse.tier == EDGE, np.float32(CALIBRATION.poorly**2), 0)
+    spread, common, share = by_object(findings, error)
     error += np.where(measured, 0, np.square(CALIBRATION.filled * spread) + CALIBRATION.filled_floor**2 + common)
     error += np.where(measured, 0, np.square(CALIBRATION.barely_seen * (1 - share) ** 2))
     return np.sqrt(error).astype(np.float32)
 
 
-def texel_evidence(
-    atlas: Atlas,
-    lit: LitDiffuse,
-    albedo: Albedo,
-    intrinsic: np.ndarray,
-    light: LightEvidence,
-    materials: list[ObjectMaterial],
-    specular: np.ndarray,
-    irradiance: np.ndarray,
-) -> TexelEvidence:
-    """All errors of a texel put together.
-
-    Parameters
-    ----------
-    intrinsic : (n,) float32
-        `without_light`.
-    specular : (n, 3) float32
-        Part of each element's L_d that was taken out as specular.
-    """
+def texel_evidence(findings: Findings, intrinsic: np.ndarray, light: LightEvidence) -> TexelEvidence:
+    """All errors of a texel put together; `intrinsic` ((n,) float32) is `without_light`."""
+    albedo = findings.albedo
     light_variance = np.square(light.unsure) + CALIBRATION.light_floor**2
     shading = np.sqrt(np.square(light.noise) + light_variance)
     shrunk = np.sqrt(np.square(CALIBRATION.noise_left * light.noise) + light_variance)
     # What was filled in shares the error of the light on what it was filled in from.
-    _, common, _ = by_object(atlas, albedo, shrunk)
+    _, common, _ = by_object(findings, shrunk)
     relative = np.square(intrinsic) + np.square(np.where(albedo.origin == MEASURED, shrunk, common))
-    gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
-    error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
+    error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss_error(findings))[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
     error = np.minimum(error, CALIBRATION.nothing_known)
-    error[np.isin(atlas.object_id, [m.object_id for m in materials if m.model.gives_light])] = 0
-    return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, lit.clipped)
+    error[np.isin(findings.surface.atlas.object_id, list(findings.emitters))] = 0
+    clipped = findings.lit_diffuse.clipped
+    return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, clipped)
 
 
-def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def by_object(findings: Findings, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of what was measured of each element's object: spread of log albedo, median of a value, share of the area.
 
     Returns
@@ -108,6 +92,7 @@ def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarr
     (n,) float32 each
         0 for objects of which nothing was measured.
     """
+    atlas, albedo = findings.surface.atlas, findings.albedo
     spread, median, share = np.zeros((3, len(atlas)), np.float32)
     level = np.log(np.maximum(albedo.rho.mean(1), 1e-3))
     for elements in by_label(atlas.object_id):
@@ -119,16 +104,15 @@ def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarr
     return spread, median, share
 
 
-def gloss_error(
-    atlas: Atlas, albedo: Albedo, materials: list[ObjectMaterial], specular: np.ndarray, irradiance: np.ndarray
-) -> np.ndarray:
+def gloss_error(findings: Findings) -> np.ndarray:
     """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
+    atlas, specular, irradiance = findings.surface.atlas, findings.specular, findings.irradiance
     result, elements = np.full(len(atlas), CALIBRATION.left, np.float32), by_number(atlas.object_id)
-    for m in materials:
+    for m in findings.materials:
         if m.model.layered:
             indices = elements.get(m.object_id, np.zeros(0, np.int64))
             taken = np.pi * specular[indices].mean(1) / np.maximum(irradiance[indices].mean(1), 1e-20)
-            known = albedo.origin[indices] == MEASURED
+            known = findings.albedo.origin[indices] == MEASURED
             if known.any():
                 # Where hardly any light comes the ratio is wild; what was filled in came from what was measured.
                 median = np.median(taken[known])

@@ -9,6 +9,7 @@ from ..io.pixels import read_pixels
 from ..kinds import Shown
 from ..light.emitters import bright_triangles
 from ..light.lobes import highlight
+from ..significance import LEVELS
 from .findings import Findings
 from .params import CALIBRATION
 
@@ -50,7 +51,7 @@ class View:
         high = ndimage.maximum_filter(self.object_id, footprint=cross, mode="nearest")
         inner = self.valid & (self.element >= 0) & (low == high)
         seen, predicted = self.radiance.mean(2), self.predicted.mean(2)
-        level = (seen + predicted) / 2 + 0.02 * float(np.median(seen))
+        level = (seen + predicted) / 2 + LEVELS.dark * float(np.median(seen))
         return np.where(inner, np.abs(predicted - seen) / np.maximum(level, 1e-30), 0)
 
 

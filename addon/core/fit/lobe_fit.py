@@ -49,6 +49,11 @@ class LobeFit:
     residual: float
     residual_lambertian: float
 
+    @property
+    def scale(self) -> float:
+        """Standard deviation of the relative residual with the lobe, never 0."""
+        return robust_scale(np.asarray(self.residual))
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -223,11 +228,10 @@ def refitted(dense: DenseProblem, fit: LobeFit, constraints: Constraints, parts:
 
     With kappa, the scale of the residuals and the spread of `fit`, which is that of all elements.
     """
-    scale = robust_scale(np.asarray(fit.residual))
-    dense = dense if dense.spread is not None else dense.expecting(fit.phi, fit.psi, scale)
+    dense = dense if dense.spread is not None else dense.expecting(fit.phi, fit.psi, fit.scale)
     estimates = []
     for part in parts:
-        solution = solve(dense.part(part), slice(None), fit.kappa, scale, constraints=constraints)
+        solution = solve(dense.part(part), slice(None), fit.kappa, fit.scale, constraints=constraints)
         best = int(np.argmin(solution.total))
         near = slice(max(best - 1, 0), best + 2)
         root, psi = between(np.sqrt(dense.grid[near]), solution.total[near], solution.psi[:, near], best - near.start)
@@ -273,13 +277,11 @@ def held_out_costs(
     phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
     what a lobe must gain.
     """
-    phi_slice = dense.at(fit.phi)
-    psi = solve(dense.part(train), phi_slice, fit.kappa, scale, constraints=constraints).psi[:, 0]
+    psi = solve(dense.part(train), dense.at(fit.phi), fit.kappa, scale, constraints=constraints).psi[:, 0]
     return element_costs(dense.part(~train), replace(fit, psi=psi), scale)
 
 
 def element_costs(dense: DenseProblem, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
-    phi_slice = dense.at(fit.phi)
-    lobe = solve(dense, phi_slice, fit.kappa, scale, psi=fit.psi).cost[0]
+    lobe = solve(dense, dense.at(fit.phi), fit.kappa, scale, psi=fit.psi).cost[0]
     return lobe, solve(dense, None, fit.kappa_lambertian, scale).cost[0]

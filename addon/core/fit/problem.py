@@ -88,16 +88,16 @@ class DenseProblem:
         shape = (int(views.max()), len(start))
         self._slot = rank * shape[1] + group
         self._order, self._shape = order, shape
-        self.there = self._laid(np.ones(self.count, np.float32))
+        self.there = self.laid(np.ones(self.count, np.float32))
         mean = np.bincount(group, problem.radiance[order].mean(1), shape[1]) / views
         # With a floor at a tenth of the object's level.
         self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
         self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
-        self.I = self._laid(problem.radiance.T)[:, None] / level
+        self.I = self.laid(problem.radiance.T)[:, None] / level
         self.spread: np.ndarray | None = None
-        self._grazing = (1 - self._laid(problem.cosine)) ** 2
+        self._grazing = (1 - self.laid(problem.cosine)) ** 2
         light = problem.light
-        A, B, dA, dB = (self._laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
+        A, B, dA, dB = (self.laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
         self._lobe = Regressors(A, B, dA * dA, dA * dB, dB * dB)
 
     @property
@@ -105,16 +105,12 @@ class DenseProblem:
         """Of an element, on average."""
         return self.count / self.there.shape[1]
 
-    def each(self, values: np.ndarray) -> np.ndarray:
-        """Values of the observations ((m, c)) as (c, v, g) float32; 0 where there is none."""
-        return self._laid(values.T)
-
     def relative(self, radiance: np.ndarray) -> np.ndarray:
-        """The same of a radiance ((m, 3)), over the elements' own levels."""
-        return self._laid(radiance.T) / self._level
+        """A radiance of the observations ((m, 3)), over the elements' own levels, (3, v, g) float32."""
+        return self.laid(radiance.T) / self._level
 
-    def _laid(self, values: np.ndarray) -> np.ndarray:
-        """(..., m) values as (..., v, g) float32."""
+    def laid(self, values: np.ndarray) -> np.ndarray:
+        """(..., m) values of the observations as (..., v, g) float32; 0 where there is none."""
         result = np.zeros((*values.shape[:-1], self._shape[0] * self._shape[1]), np.float32)
         result[..., self._slot] = values[..., self._order]
         return result.reshape(*values.shape[:-1], *self._shape)

@@ -34,7 +34,7 @@ from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
 from ..scene.shape_parts import WALL
 from ..settings import Settings
-from ..significance import LEVELS, SIGMA_OF_MAD
+from ..significance import LEVELS
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     if problem is not None and choice.fit is not None and "see-through" not in room.settings.without and not guess:
         behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
         lobe = choice.fit if choice.model.has_lobe else None
-        see_through = judge(problem, behind, lobe, max(SIGMA_OF_MAD * choice.fit.residual, 1e-4))
+        see_through = judge(problem, behind, lobe, choice.fit.scale)
         if see_through is not None:
             choice = set_apart(choice, see_through, is_sure(see_through))
     if choice.model.has_albedo and not guess:

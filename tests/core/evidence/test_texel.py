@@ -52,8 +52,11 @@ def evidence(room, lit, albedo, light, models=None):
     n = len(room.atlas)
     materials = [ObjectMaterial(i, "thing", models.get(i, LAMBERTIAN)) for i in range(7)]
     nothing = np.zeros((n, 3), np.float32)
-    own = without_light(room.atlas, lit, albedo)
-    return texel_evidence(room.atlas, lit, albedo, own, light, materials, nothing, nothing + 1)
+    findings = SimpleNamespace(
+        surface=room, lit_diffuse=lit, albedo=albedo, materials=materials, specular=nothing, irradiance=nothing + 1,
+        emitters={m.object_id for m in materials if m.model.gives_light},
+    )  # fmt: skip
+    return texel_evidence(findings, without_light(findings), light)
 
 
 def test_errors_add_up(box):
@@ -96,7 +99,8 @@ def test_an_object_is_surer_than_its_texels_and_says_what_was_seen(box):
     hidden = (box.atlas.object_id == 0) & (box.atlas.position[:, 0] > 1)
     lit, albedo = known(box, ~hidden), grey(box, filled=hidden)
     texels = evidence(box, lit, albedo, sure_light(box, 0.1))
-    floor, ceiling = object_evidence(box.atlas, lit, albedo, texels)[:2]
+    findings = SimpleNamespace(surface=box, lit_diffuse=lit, albedo=albedo)
+    floor, ceiling = object_evidence(findings, texels)[:2]
     assert floor.seen_share == pytest.approx(0.25, abs=0.01) and ceiling.seen_share == 1
     assert ceiling.albedo == pytest.approx((0.5, 0.5, 0.5))
     half = Z90 * CALIBRATION.of_object * float(texels.albedo[box.atlas.object_id == 1].mean())
@@ -125,7 +129,9 @@ def light_of(room, off: float, seen_lamp: bool):
     lamp = room.atlas.object_id == 6
     sign = np.random.default_rng(0).choice([-1, 1], n)[:, None]
     shading.irradiance[:] = np.pi * radiance / room.by_object(ALBEDO, 1.0) * np.exp(off * sign)
-    return light_evidence(field, shading, known(room, seen_lamp | ~lamp), np.full(n, 0.2, np.float32)), lamp
+    lit = known(room, seen_lamp | ~lamp)
+    findings = SimpleNamespace(field=field, shading=shading, lit_diffuse=lit, threads=0, seed=0)
+    return light_evidence(findings, np.full(n, 0.2, np.float32)), lamp
 
 
 @pytest.fixture(scope="module")

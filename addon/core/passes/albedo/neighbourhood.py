@@ -33,7 +33,6 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
 
     Parameters
     ----------
-    lit : LitDiffuse
     object_id : (n,) int
         Of each element: one seen once or twice is as unsure as others of its object.
     of_object : bool

@@ -93,8 +93,6 @@ def caustics(
     ----------
     room : LightField
         With its lamps. Mirrors stop photons.
-    gloss : Gloss
-    photons : int
 
     Returns
     -------

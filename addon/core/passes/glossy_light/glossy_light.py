@@ -38,7 +38,6 @@ class Excess(LightField):
     ----------
     room : LightField
         With all its light.
-    materials : sequence of ObjectMaterial
     specular : (n, 3) float32
         Part of each element's L_d that is specular.
     """

@@ -35,7 +35,6 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     ----------
     field : LightField
         With L_d, dark where no frame saw it.
-    samples : Samples
     """
     atlas, mesh = field.atlas, field.mesh
     clear = np.flatnonzero(~samples.saturated)

@@ -109,7 +109,7 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
         Standard deviation of the relative residual.
     """
     dense = DenseProblem(problem)
-    valid = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
+    valid = dense.laid(behind.known)
     usable = valid.sum(0) >= LEVELS.views
     if usable.sum() < max(LEVELS.few, SEE_THROUGH.least_told * len(usable)):
         return None

@@ -14,7 +14,7 @@ from ...fit.lobe_fit import LobeFit, element_costs, fit_lobe, held_out_costs, hu
 from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
-from ...significance import LEVELS, SIGMA_OF_MAD
+from ...significance import LEVELS
 from .one_colour import OneColour
 from .params import CHOICE, FIT
 
@@ -89,8 +89,7 @@ def _gain_of_metal(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, f
 
 def _weighted(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
     """An object's observations weighted as under its own fit, and the standard deviation of their residual."""
-    scale = max(SIGMA_OF_MAD * fit.residual, 1e-4)
-    return dense.expecting(fit.phi, fit.psi, scale), scale
+    return dense.expecting(fit.phi, fit.psi, fit.scale), fit.scale
 
 
 def is_dielectric(fit: LobeFit) -> bool:

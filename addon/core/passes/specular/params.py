@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...significance import LEVELS
+
 
 @dataclass(frozen=True)
 class FitParams:
@@ -33,7 +35,7 @@ class FitParams:
         Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels.
     """
 
-    part_elements: int = 1050
+    part_elements: int = 3 * LEVELS.of_object
     views: int = 12
     candidates: int = 20
     expecting: int = 4

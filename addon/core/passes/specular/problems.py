@@ -51,16 +51,12 @@ def pick(
             chosen = candidates[np.argsort(-highlight[candidates], kind="stable")[: elements // 2]]
         others = rng.choice(np.setdiff1d(enough, chosen), elements - len(chosen), replace=False)
         enough = np.append(chosen, others)
-    wanted = np.zeros(len(ids), bool)
-    wanted[enough] = True
-    index, group = of_object[wanted[group]], group[wanted[group]]
-    if not len(index):
-        return index
+    wanted = np.isin(group, enough)
+    index, group = of_object[wanted], group[wanted]
     order = np.lexsort((rng.random(len(index)), group))
-    index, group = index[order], group[order]
-    start = np.concatenate([[0], np.flatnonzero(np.diff(group)) + 1])
-    rank = np.arange(len(index)) - np.repeat(start, np.diff(np.concatenate([start, [len(index)]])))
-    return np.sort(index[rank < views])
+    count = np.bincount(group)
+    rank = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
+    return np.sort(index[order][rank < views])
 
 
 class Problems:
@@ -68,8 +64,6 @@ class Problems:
 
     Parameters
     ----------
-    field : LightField
-    samples : Samples
     without : collection of str
         Passes left out.
     """

@@ -56,10 +56,8 @@ class SpecularPart:
 
     Parameters
     ----------
-    field : LightField
     materials : sequence of ObjectMaterial
         Those whose lobes are predicted.
-    seed : int
     rays : int
         Of a pixel.
     """
@@ -151,7 +149,6 @@ def without_specular(
 
     Parameters
     ----------
-    part : SpecularPart
     lit : LitDiffuse
         With the specular part.
     glossy : (n,) bool

@@ -9,6 +9,7 @@ sensor clipped only a lower bound is known, which is enough (`Edges`).
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -103,12 +104,7 @@ def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray) -> n
 
 @dataclass(frozen=True)
 class SolvedSun:
-    """A sun, the sample that it was found with, and its edges.
-
-    Attributes
-    ----------
-    sun : Sun
-    """
+    """A sun, the sample that it was found with, and its edges."""
 
     sun: Sun
     _even: Spots
@@ -197,16 +193,15 @@ def find_sun(
 
 def _fit(edges: Edges, direction: np.ndarray) -> Guess:
     """The sun near the direction under which neighbours along the edges are most alike."""
-    strength = edges.strengths(direction)[-1]
-    fit = min((edges.explained(direction, strength, r) for r in RADII), key=lambda guess: guess.cost)
+
+    def solved(direction: np.ndarray) -> Guess:
+        strength = edges.strengths(direction)[-1]
+        return min((edges.explained(direction, strength, r) for r in RADII), key=lambda guess: guess.cost)
+
+    fit = solved(direction)
     for steps in (SOFT, SOFT[1:]):
-
-        def cost(direction: np.ndarray, current: Guess = fit) -> Guess:
-            return edges.explained(direction, current.strength, current.radius)
-
-        fit = _pattern_search(cost, fit, steps)
-        strength = edges.strengths(fit.direction)[-1]
-        fit = min((edges.explained(fit.direction, strength, r) for r in RADII), key=lambda guess: guess.cost)
+        cost = partial(edges.explained, strength=fit.strength, radius=fit.radius)
+        fit = solved(_pattern_search(cost, fit, steps).direction)
     return fit
 
 
