@@ -16,7 +16,7 @@ from ..json_values import key
 from ..kinds import Shown
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
-from ..passes.sharpening.params import SHARPENING
+from ..passes.sharpening.sharpen import SHARPENING
 from ..progress import Rounds
 from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup, make_atlas

@@ -13,7 +13,7 @@ import pytest
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.pose_refinement import poses as poses_found
-from addon.core.passes.pose_refinement.params import POSES
+from addon.core.passes.pose_refinement.poses import POSES
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store

@@ -30,7 +30,7 @@ from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
 from ...significance import LEVELS
-from .params import CAUSTICS
+from .params import GLOSSY
 
 AT_ONCE: Block[int] = 1 << 15
 
@@ -84,7 +84,7 @@ def caustics(
     bright: BrightTriangles,
     gloss: Gloss,
     seed: int = 0,
-    photons: int = CAUSTICS.photons,
+    photons: int = GLOSSY.photons,
     threads: int = 0,
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
@@ -118,7 +118,7 @@ def caustics(
         element, place, index = _traced(room, outgoing)
         landed.append(element)
         power.append(outgoing.power[index, 3:])
-        for _ in range(CAUSTICS.bounces):
+        for _ in range(GLOSSY.bounces):
             incoming = _Light(place, outgoing.direction[index], outgoing.power[index, :3])
             outgoing = _scattered(room, gloss, element, incoming, rng)
             if not len(outgoing.origin):
@@ -180,8 +180,8 @@ def _over_cells(atlas: Atlas, at: np.ndarray, power: np.ndarray, threads: int) -
 
     for k in range(LESS_NOISE.grids):
         left = np.arange(count)
-        for doubled in range(CAUSTICS.doublings + 1):
-            least = LEVELS.enough if doubled < CAUSTICS.doublings else 0
+        for doubled in range(GLOSSY.doublings + 1):
+            least = LEVELS.enough if doubled < GLOSSY.doublings else 0
             portions = cells(atlas.position[left], atlas.normal[left], k / LESS_NOISE.grids, 2.0**doubled)
             places = ((left[index], group, least) for index, group in portions)
             left = np.concatenate([left[:0], *ordered_map(spread, places, threads)])

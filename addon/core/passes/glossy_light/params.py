@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class GlossyLightParams:
-    """Of `glossy_light` (`glossy-light` in the ablation).
+    """Of `glossy_light` and `caustics` (`glossy-light` and `caustics` in the ablation).
 
     Attributes
     ----------
@@ -18,23 +18,6 @@ class GlossyLightParams:
         room.
     most_taken : float
         Of E that may be taken away, by noise or where a median was all highlight.
-    """
-
-    rays: int = 32
-    lobe_rays: int = 4
-    finest_share: float = 0.02
-    most_taken: float = 0.5
-
-
-GLOSSY = GlossyLightParams()
-
-
-@dataclass(frozen=True)
-class CausticsParams:
-    """Of `caustics`.
-
-    Attributes
-    ----------
     photons : int
         Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times
         these.
@@ -46,9 +29,13 @@ class CausticsParams:
         Of a cell's edge, where too few photons fell.
     """
 
+    rays: int = 32
+    lobe_rays: int = 4
+    finest_share: float = 0.02
+    most_taken: float = 0.5
     photons: int = 1 << 18
     bounces: int = 4
     doublings: int = 3
 
 
-CAUSTICS = CausticsParams()
+GLOSSY = GlossyLightParams()

@@ -5,26 +5,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DenoiseParams:
-    """Of `denoise` (`mesh-denoising` in the ablation).
+    """Of `denoise` and, but for the first, of `planes` (`mesh-denoising` and `sheets` in the ablation).
 
     Attributes
     ----------
     tolerance : float
         Of each linear solve, by conjugate gradients.
-    """
-
-    tolerance: float = 1e-3
-
-
-DENOISE = DenoiseParams()
-
-
-@dataclass(frozen=True)
-class PlanesParams:
-    """Of `planes` (`sheets` in the ablation).
-
-    Attributes
-    ----------
     reach : float
         Times the noise (and the plane's own uncertainty), how far denoised points may lie off, as a scan's smooth error
         shows: half smooth, half from vertex to vertex it has 1.4 times what `noise_of` sees. No point goes farther.
@@ -52,6 +38,7 @@ class PlanesParams:
         How much firmer a sheet holds its points than the denoised places do, as a ratio of standard deviations.
     """
 
+    tolerance: float = 1e-3
     reach: float = 4.5
     turn: float = 0.15
     known: float = 0.05
@@ -63,4 +50,4 @@ class PlanesParams:
     stiff: float = 50.0
 
 
-PLANES = PlanesParams()
+DENOISE = DenoiseParams()

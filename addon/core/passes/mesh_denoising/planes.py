@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from ...significance import LEVELS, SIGMA_OF_MAD
-from .params import PLANES
+from .params import DENOISE
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Grower:
         self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
         tilt = noise * self.length.max(1) / np.maximum(double_area, 1e-30)  # noise / height
         # However low a triangle: front and sides of a thin plate are pi / 2 apart.
-        self.min_cosine = np.cos(np.minimum(PLANES.turn + tilt, np.pi / 4))
+        self.min_cosine = np.cos(np.minimum(DENOISE.turn + tilt, np.pi / 4))
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
@@ -123,7 +123,7 @@ class Grower:
             mean, axes, _ = moments.plane()
             distance = np.abs((self.points[corner] - mean) @ axes[0])
             spread = SIGMA_OF_MAD * float(np.median(distance))
-            closer = (distance <= np.clip(PLANES.reach * spread, self.noise, PLANES.reach * self.noise)).all(1)
+            closer = (distance <= np.clip(DENOISE.reach * spread, self.noise, DENOISE.reach * self.noise)).all(1)
             if not closer.any() or (closer == near).all():
                 break
             near = closer
@@ -156,7 +156,7 @@ class Grower:
             adjacent, first = np.unique(adjacent[fit], return_index=True)
             arm = (self.points[self.faces[adjacent]] - mean) @ axes.T
             variance = 1 + 1 / count + arm[..., 1] ** 2 / scatter[1] + arm[..., 2] ** 2 / scatter[2]
-            fits = (arm[..., 0] ** 2 < (PLANES.reach * self.noise) ** 2 * variance).all(1)
+            fits = (arm[..., 0] ** 2 < (DENOISE.reach * self.noise) ** 2 * variance).all(1)
             front, sign = adjacent[fits], winding[fit][first][fits]
             self._seen[front] = self._run
         return np.concatenate(region)
@@ -179,10 +179,10 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float
     moments.add(points)
     mean, axes, scatter = moments.plane()
     spread = np.sqrt(scatter[1:] / n)  # of y and x, metres
-    if n < 4 or noise > PLANES.known * np.sqrt(scatter[1]):
+    if n < 4 or noise > DENOISE.known * np.sqrt(scatter[1]):
         return None
     # A rectangle's sides are sqrt(12) times its standard deviations; a strip's width is twice its area by its outline.
-    if area < PLANES.fill * 12 * spread.prod() and noise * outline > PLANES.known * 4 * area:
+    if area < DENOISE.fill * 12 * spread.prod() and noise * outline > DENOISE.known * 4 * area:
         return None
     z, y, x = ((points - mean) @ axes.T).T
     x, y = x / spread[1], y / spread[0]
@@ -190,7 +190,7 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float
     bend = np.stack([x * x, x * y, y * y], 1)
     coefficients = np.linalg.lstsq(flat, bend, rcond=None)[0]
     u, s, vt = np.linalg.svd(bend - flat @ coefficients, full_matrices=False)
-    determined = s > PLANES.determined * np.sqrt(n)
+    determined = s > DENOISE.determined * np.sqrt(n)
     amplitude = (u.T @ z)[determined]
     # Each determined term alone, one in a row, per metre.
     terms = np.concatenate([-(coefficients @ vt[determined].T).T, vt[determined]], 1)
@@ -206,10 +206,10 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float
     chance = noise * np.sqrt(sum(slope(term) ** 2 for term in terms / s[determined, None]))
     explained = (amplitude**2).sum() / noise**2
     total, freedom = (z**2).sum() / noise**2, n - 3 - determined.sum()
-    bent = explained > PLANES.bent * max(1, (total - explained) / max(freedom, 1))
-    gentle = slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * PLANES.gentle
+    bent = explained > DENOISE.bent * max(1, (total - explained) / max(freedom, 1))
+    gentle = slope(c) < DENOISE.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * DENOISE.gentle
     # Chi squared within three of its standard deviations.
-    likely = total / PLANES.spread**2 < n - 3 + LEVELS.sigmas * np.sqrt(2 * (n - 3))
+    likely = total / DENOISE.spread**2 < n - 3 + LEVELS.sigmas * np.sqrt(2 * (n - 3))
     return Sheet(mean, axes[0], region) if likely and gentle else None
 
 
@@ -263,13 +263,13 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
     facing = np.empty((len(measured), 3))
     main = sheet == main_sheet[point]
     facing[point[main]] = normal[main]
-    crossing = main | (np.abs((normal * facing[point]).sum(1)) < np.cos(PLANES.turn))
+    crossing = main | (np.abs((normal * facing[point]).sum(1)) < np.cos(DENOISE.turn))
     for chosen in (main, crossing):  # last the point where all of its sheets meet, if it may go there
-        p, n, g = point[chosen], PLANES.stiff * normal[chosen], PLANES.stiff * gap[chosen]
+        p, n, g = point[chosen], DENOISE.stiff * normal[chosen], DENOISE.stiff * gap[chosen]
         rhs = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
         system = np.stack([np.bincount(p, n[:, i] * n[:, j], len(measured)) for i in range(3) for j in range(3)], 1)
         step = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), rhs[..., None])[..., 0]
         target = smooth + step
-        fits = (largest > 0) & (np.linalg.norm(target - measured, axis=1) <= PLANES.reach * noise)
+        fits = (largest > 0) & (np.linalg.norm(target - measured, axis=1) <= DENOISE.reach * noise)
         moved[fits] = target[fits]
     return moved

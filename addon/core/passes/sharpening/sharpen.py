@@ -9,7 +9,7 @@ One round. A second and a third changed bathroom, kitchen and living room by -.2
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,26 @@ from ...scene.params import VISIBILITY
 from ...scene.surface import Surface
 from ...scene.visibility import CLEAN, FrameView
 from ...significance import LEVELS
-from .params import SHARPENING
+
+
+@dataclass(frozen=True)
+class SharpeningParams:
+    """Of `sharpen` (`sharpening` in the ablation).
+
+    Attributes
+    ----------
+    detail : float
+        Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even,
+        there is nothing to sharpen.
+    most : float
+        Times that L_d may become brighter or darker.
+    """
+
+    detail: float = 0.02
+    most: float = 2.0
+
+
+SHARPENING = SharpeningParams()
 
 MIDDLE: Unit[float] = 2 / 3
 CORNER: Unit[float] = 1 / 12

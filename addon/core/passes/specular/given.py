@@ -21,7 +21,7 @@ from ...significance import LEVELS
 from .intervals import UNKNOWN, GlossInterval
 from .models import Choice, choose_model, metal_f0, metal_fit
 from .one_colour import compare, compare_coat
-from .params import FIT, GIVEN
+from .params import CHOICE, FIT
 from .problems import Problems
 
 
@@ -40,7 +40,7 @@ def fit_given(
         Of each observation.
     """
     if given.brdf is not None and not given.brdf.has_lobe:
-        return Choice(given.brdf, None, sigmas=GIVEN.sure), None
+        return Choice(given.brdf, None, sigmas=CHOICE.sure), None
     phi = None if given.roughness is None else given.roughness**2
     problem, enough = _problem(problems, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets or GGX)
     model = given.brdf or _model(given, problem, enough)
@@ -48,7 +48,7 @@ def fit_given(
     fit = _fit(model, phi, f0, problem, enough, irradiance)
     if phi is not None:
         fit = replace(fit, phi=phi)  # not the nearest that the grid has
-    return Choice(model, replace(fit, psi=fit.psi if f0 is None else f0), gain=0.0, sigmas=GIVEN.sure), problem
+    return Choice(model, replace(fit, psi=fit.psi if f0 is None else f0), gain=0.0, sigmas=CHOICE.sure), problem
 
 
 def _problem(

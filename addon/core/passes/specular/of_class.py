@@ -13,7 +13,7 @@ from ...fit.problem import Problem
 from ...significance import LEVELS
 from ...weighted import weighted_median
 from .models import Choice, contradicts, is_dielectric, own_or_class_lobe
-from .params import CHOICE, GIVEN
+from .params import CHOICE
 
 
 def adopt_from_class(
@@ -46,19 +46,19 @@ def adopt_from_class(
         }
         source = max(sorted(clear) or judges, key=lambda i: glossy[i].sigmas)
         shared = _pooled([c for c in judges.values() if c.model is glossy[source].model], glossy[source])
-        told_otherwise = shared.looks is not None or shared.sigmas >= GIVEN.sure
+        told_otherwise = shared.looks is not None or shared.sigmas >= CHOICE.sure
         agreed = not shared.model.layered or (
             _jointly_significant(members) and (told_otherwise or _gains_enough(members, problems))
         )
         for i, choice in members.items():
-            may_become_metal = shared.model.lobe_alone and not choice.model.lobe_alone
-            if may_become_metal and choice.metal is not None:
-                note = "Not beyond doubt by itself; others of its class are metal."
-                fit = own_or_class_lobe(choice.metal, shared.lobe, shared.model, problems.get(i))
-                result[i] = replace(choice, model=shared.model, fit=fit, note=note)
-            elif shared.model.layered and choice.dielectric is not None:
+            alternative = None
+            if shared.model.lobe_alone and not choice.model.lobe_alone:
+                alternative, note = choice.metal, "Not beyond doubt by itself; others of its class are metal."
+            elif shared.model.layered:
+                alternative = choice.dielectric
                 note = "Like a metal, but not beyond doubt; others of its class are not."
-                fit = own_or_class_lobe(choice.dielectric, shared.lobe, shared.model, problems.get(i))
+            if alternative is not None:
+                fit = own_or_class_lobe(alternative, shared.lobe, shared.model, problems.get(i))
                 result[i] = replace(choice, model=shared.model, fit=fit, note=note)
             elif not choice.model.has_lobe and agreed and not _contradicted(shared, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."

@@ -70,10 +70,13 @@ class ChoiceParams:
         small highlight, but what they show nothing else explains (a bathroom's tiles: gain .16 at 2.2 standard errors;
         nothing truly diffuse gained a tenth with less than 3). Not of a handful of elements, whose standard error is no
         better known than that.
+    sure : float
+        Standard errors that a model or lobe that an artist gives counts for when others of its class adopt it.
     """
 
     bare: float = 2.0
     min_gain: float = 0.02
+    sure: float = 1000.0
 
 
 CHOICE = ChoiceParams()
@@ -107,22 +110,6 @@ class LooksParams:
 
 
 LOOKS = LooksParams()
-
-
-@dataclass(frozen=True)
-class GivenParams:
-    """Of objects whose model is given by an artist, or by others of the class.
-
-    Attributes
-    ----------
-    sure : float
-        Standard errors that a given model or lobe counts for when others of its class adopt it.
-    """
-
-    sure: float = 1000.0
-
-
-GIVEN = GivenParams()
 
 
 @dataclass(frozen=True)

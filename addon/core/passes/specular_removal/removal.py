@@ -29,7 +29,31 @@ from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Frame, Pixels
 from ...scene.rays import Hits
 from ...scene.visibility import SATURATED, FrameView
-from .params import REMOVAL
+
+
+@dataclass(frozen=True)
+class RemovalParams:
+    """How the specular part is predicted, and when it is accepted.
+
+    Attributes
+    ----------
+    rays : int
+        Of a pixel: a sixteenth of what an observation has in the fit, as neighbours share theirs.
+    pixels : int
+        Of a frame that are traced, about; of a larger one, one in each square cell.
+    reach : int
+        Pixels, or cells, whose rays are shared: two standard deviations of their weights.
+    most : float
+        Times the remainder that the specular part may be.
+    """
+
+    rays: int = 8
+    pixels: int = 1 << 17
+    reach: int = 2
+    most: float = 3.0
+
+
+REMOVAL = RemovalParams()
 
 NO_OBJECT: Code[int] = -1
 
@@ -65,14 +89,9 @@ class SpecularPart:
     def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], seed: int = 0, rays: int = REMOVAL.rays):
         self._field, self._bright, self._seed, self._rays = field, bright_triangles(field), seed, rays
         self._lobes: dict[int, tuple[float, float, Microfacets]] = {}
-        for material in materials:
-            if material.alpha is None or material.f0 is None or material.model.microfacets is None:
-                raise ValueError(f"{material.name} has no lobe")
-            self._lobes[material.object_id] = (
-                float(material.alpha),
-                float(np.mean(material.f0)),
-                material.model.microfacets,
-            )
+        for m in materials:
+            assert m.alpha is not None and m.f0 is not None and m.model.microfacets is not None
+            self._lobes[m.object_id] = float(m.alpha), float(np.mean(m.f0)), m.model.microfacets
 
     def __call__(self, view: FrameView, seed: int) -> np.ndarray:
         """I_nd as a frame sees it, (height, width, 3) float32; 0 where there is no lobe."""

@@ -6,8 +6,8 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class PlaneParams:
-    """Of `planes`: what lies in one plane, and the picture of it.
+class TextureParams:
+    """Of `planes`, that is what lies in one plane and the picture of it; of `synthesis`; and what is enough to go by.
 
     Attributes
     ----------
@@ -21,21 +21,6 @@ class PlaneParams:
         Texels that a triangle covers at least. What is smaller shares its texels with others and is not laid out flat.
     stretch : float
         Times that an atlas's axis may be longer than the other, and a texel larger than the picture's cells.
-    """
-
-    tries: int = 16
-    planes: int = 6
-    cells: int = 1_000_000
-    least: float = 0.05
-    stretch: float = 1.5
-
-
-@dataclass(frozen=True)
-class TextureParams:
-    """Of `synthesis`, and of whether there is enough to go by.
-
-    Attributes
-    ----------
     mostly : int
         Cells along a square of which most have to be sure (`LEVELS.sure`, or the better half) for the one in its middle
         to be copied.
@@ -61,6 +46,11 @@ class TextureParams:
         What a place counts for in the choice of offsets once one more of them covers it.
     """
 
+    tries: int = 16
+    planes: int = 6
+    cells: int = 1_000_000
+    least: float = 0.05
+    stretch: float = 1.5
     mostly: int = 5
     decay: float = float(np.exp(-1))
     samples: float = 64.0
@@ -74,5 +64,4 @@ class TextureParams:
     again: float = 0.7
 
 
-PLANES = PlaneParams()
 TEXTURE = TextureParams()

@@ -14,7 +14,7 @@ from ...scene.model import Mesh
 from ...scene.params import COPLANAR
 from ...scene.tangent_frame import tangent_frame
 from ...significance import LEVELS
-from .params import PLANES
+from .params import TEXTURE
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
     size = atlas.size
     triangles = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
     corner = atlas.uv[triangles].astype(np.float64) * size
-    large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * PLANES.least
+    large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * TEXTURE.least
     triangles = triangles[large]
     if not len(triangles):
         return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
@@ -128,12 +128,12 @@ def planes_of(atlas: Atlas, elements: np.ndarray, filled: np.ndarray) -> Iterato
         return (normal[index] @ direction > np.cos(COPLANAR.turn)) & (off < COPLANAR.off)
 
     remaining = np.ones(len(elements), bool)
-    for _ in range(PLANES.planes):
+    for _ in range(TEXTURE.planes):
         total = (weight * remaining).sum()
         if total < min_area:
             return
         drawn = rng.choice(len(elements), LEVELS.sample, p=weight * remaining / total)
-        inliers = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: PLANES.tries]]
+        inliers = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: TEXTURE.tries]]
         best = drawn[max(inliers, key=np.count_nonzero)]
         direction = normal[best].mean(0)
         direction /= np.linalg.norm(direction)
@@ -173,11 +173,11 @@ class Picture:
         cells, targets = (np.asarray(points, np.float64) @ axes for points in (atlas.position[known], wanted.position))
         low, high = cells.min(0), cells.max(0)
         size, reach = 1 / np.sqrt(np.linalg.norm(np.cross(*axes.T))), high - low
-        inside = ((targets >= low - reach) & (targets <= high + reach)).all(1) & (wanted.edge < PLANES.stretch * size)
+        inside = ((targets >= low - reach) & (targets <= high + reach)).all(1) & (wanted.edge < TEXTURE.stretch * size)
         grid = np.concatenate([cells, targets[inside]])
         # Rounded, not cut off: where texels and cells are the same each texel lies in the middle of its cell.
         grid = np.rint(grid - grid.min(0)).astype(np.int64)
-        coarser = int(np.ceil(np.sqrt(np.prod(grid.max(0) + 1.0) / PLANES.cells)))
+        coarser = int(np.ceil(np.sqrt(np.prod(grid.max(0) + 1.0) / TEXTURE.cells)))
         grid //= coarser
         shape = (int(grid[:, 0].max()) + 1, int(grid[:, 1].max()) + 1)
         flat = grid[:, 0] * shape[1] + grid[:, 1]
@@ -215,8 +215,8 @@ def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray) -> np.ndarray:
     largest = triangle[mesh.geometry[1][triangle].argmax()]
     along = texel_axes(atlas, mesh, np.array([largest]))[1][0]
     length = np.linalg.norm(along, axis=0)
-    square = length.max() < PLANES.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
-    if not square or not 1 / PLANES.stretch < length.mean() / atlas.texel_edge < PLANES.stretch:
+    square = length.max() < TEXTURE.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
+    if not square or not 1 / TEXTURE.stretch < length.mean() / atlas.texel_edge < TEXTURE.stretch:
         normal = mesh.geometry[0][largest : largest + 1]
         along = np.stack([tangent[0] for tangent in tangent_frame(normal)], 1).astype(np.float64) * atlas.texel_edge
     return np.linalg.pinv(along).T

@@ -51,7 +51,7 @@ def texture_of(
     Texture
         Of planes whose measured part has detail beyond its error, and enough of it.
     """
-    level, textures = np.log(np.maximum(rho.mean(1), LEVELS.dark)), []
+    level, textures = np.log(np.maximum(rho.mean(1), LEVELS.dark)), [NOTHING]
     objects = [
         elements
         for elements in by_label(atlas.object_id)
@@ -74,10 +74,7 @@ def texture_of(
             if _textured(level, error, known) and len(plane_texels.texel) >= LEVELS.many:
                 picture = Picture.of(atlas, mesh, known, plane_texels)
                 textures.append(_filled(picture, rho[known], error[known]))
-    if not textures:
-        return NOTHING
-    texel, value = (np.concatenate(parts) for parts in zip(*textures, strict=True))
-    return Texture(texel, value)
+    return Texture(np.concatenate([t.texel for t in textures]), np.concatenate([t.rho for t in textures]))
 
 
 def _foreign(log: np.ndarray, source: np.ndarray, known: np.ndarray, error: float) -> np.ndarray:
@@ -104,7 +101,7 @@ def _beyond(contrast: float, error: np.ndarray) -> bool:
     return contrast > float(np.median(error))
 
 
-def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> Texture:
     """Texels of one plane and their albedo; none where there is too little to go by."""
     painted, known = picture.paint(rho)
     # As in the neighbourhood prior: what was measured well, the better half at least; and no clamped albedo.
@@ -113,19 +110,19 @@ def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.nd
     around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], TEXTURE.mostly, mode="constant")
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:
-        return NOTHING.texel, NOTHING.rho
+        return NOTHING
     log = np.log(np.maximum(painted, LEVELS.dark))
     same_surface = known & ~_foreign(log, source, known, typical_error)
     source &= same_surface
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))
     if source.sum() < TEXTURE.samples * scale**2:
-        return NOTHING.texel, NOTHING.rho
+        return NOTHING
     smooth = np.maximum(smooth_mean(painted, same_surface, TEXTURE.smooth * scale), LEVELS.dark)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
     if not _beyond(typical_contrast(detail, source, TEXTURE.smooth * scale), error):
-        return NOTHING.texel, NOTHING.rho
+        return NOTHING
     copy, done = completed(detail, source, picture.hole & ~known, scale)
     filled = (done | known).ravel()[picture.wanted]
     value = (np.exp(copy) * smooth).reshape(-1, 3)[picture.wanted[filled]]
-    return picture.texel[filled], np.clip(value, 0, 1).astype(np.float32)
+    return Texture(picture.texel[filled], np.clip(value, 0, 1).astype(np.float32))

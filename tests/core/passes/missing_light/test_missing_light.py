@@ -16,8 +16,7 @@ from addon.core.light.openings import CELLS, Openings
 from addon.core.light.sun import Sun
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, measured_patches
-from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, same_lamps
-from addon.core.passes.missing_light.params import MISSING
+from addon.core.passes.missing_light.missing_light import MISSING, _through_cells, find_missing_light, same_lamps
 from addon.core.scene.elements import ElementLookup
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.patches import Patches

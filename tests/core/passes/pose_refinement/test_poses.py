@@ -9,8 +9,7 @@ import pytest
 
 from addon.core.errors import InterruptedRun
 from addon.core.lit_diffuse.accumulate import accumulate
-from addon.core.passes.pose_refinement.params import POSES
-from addon.core.passes.pose_refinement.poses import Poses, Texture, moved, refine_poses
+from addon.core.passes.pose_refinement.poses import POSES, Poses, Texture, moved, refine_poses
 from addon.core.progress import Progress
 from addon.core.scene.model import Pixels
 from tests.core.lit_diffuse.test_accumulate import frames_of

@@ -12,8 +12,7 @@ from addon.core.brdf.material import ObjectMaterial
 from addon.core.errors import InterruptedRun
 from addon.core.light.lobes import highlight
 from addon.core.passes.albedo.neighbourhood import relative_error
-from addon.core.passes.specular_removal.params import REMOVAL
-from addon.core.passes.specular_removal.removal import SpecularPart, one_of_each_cell, without_specular
+from addon.core.passes.specular_removal.removal import REMOVAL, SpecularPart, one_of_each_cell, without_specular
 from addon.core.progress import Progress
 from addon.core.scene.visibility import CLEAN, SATURATED
 from tests.core.glossy_box import Box

@@ -9,8 +9,7 @@ import pytest
 
 from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
 from addon.core.passes.specular.describe import lamp_material
-from addon.core.passes.unlit_lamps.params import UNLIT
-from addon.core.passes.unlit_lamps.unlit import looks_outside, unlit
+from addon.core.passes.unlit_lamps.unlit import UNLIT, looks_outside, unlit
 from addon.core.scene.model import Instance
 from tests.core.rooms import around, box_sides, cut, make_room, quad
 
