@@ -101,8 +101,6 @@ def albedo_of(
         Relative error of E.
     emitters : set of int
         Objects that have no albedo.
-    without : collection of str
-        Passes left out.
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), irradiance_error)

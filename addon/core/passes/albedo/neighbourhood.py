@@ -164,8 +164,6 @@ def shrink(
         Clamped quotient; anything where `error` is inf.
     error : (m,) float32
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
-    without : collection of str
-        Passes left out.
     references : References, optional
         Elements among which a second colour is looked for, in place of the object's own.
 

@@ -48,7 +48,7 @@ def shrunk_to_second_colour(
         As measured; above 0.
     error : (m,)
         Its relative standard error.
-    around : Neighbourhood
+    prior : Neighbourhood
         Of cells; neighbours are rows of `reference`.
     cell : (m,) int
         Each element's cell.

@@ -121,8 +121,6 @@ def glossy_light(
         E without it.
     share : (float, float)
         From where to where the stage's progress goes.
-    without : collection of str
-        Passes left out.
     """
     if not excess.any or not len(element):
         return np.zeros((len(element), 3), np.float32)

@@ -104,12 +104,6 @@ def _normal_equations(
     return theta, weight, jacobian, system.tocsr()
 
 
-def _solve(system: sparse.csr_matrix, rhs: np.ndarray) -> np.ndarray:
-    """The solution of a symmetric positive definite system, by conjugate gradients."""
-    preconditioner = sparse.diags(1 / system.diagonal())
-    return cg(system, rhs, rtol=DENOISE.tolerance, maxiter=LEVELS.steps, M=preconditioner)[0]
-
-
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
     """Points held within `farthest` of where they were measured."""
     offset = points - measured
@@ -144,8 +138,6 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     noise : float
         Standard deviation along the normal, in metres, of what is independent from vertex to vertex
         (`mesh_noise.noise_of`); 0 gives the vertices back as they are.
-    without : collection of str
-        Passes left out.
     """
     if not noise > 0:
         return mesh.vertices
@@ -163,7 +155,9 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
         normal = point_normals(points, faces)
         theta, weight, jacobian, system = _normal_equations(points, normal, hinges, noise, scale)
         displacement = ((points - measured) * normal).sum(1)
-        step = _solve(system, -displacement * (1 / noise**2) - jacobian.T @ (weight * theta))
+        rhs = -displacement * (1 / noise**2) - jacobian.T @ (weight * theta)
+        preconditioner = sparse.diags(1 / system.diagonal())
+        step = cg(system, rhs, rtol=DENOISE.tolerance, maxiter=LEVELS.steps, M=preconditioner)[0]
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, LEVELS.sigmas * noise)

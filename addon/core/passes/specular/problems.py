@@ -60,13 +60,7 @@ def pick(
 
 
 class Problems:
-    """Makes the problem of any object, with as many elements, views and rays as wished.
-
-    Parameters
-    ----------
-    without : collection of str
-        Passes left out.
-    """
+    """Makes the problem of any object, with as many elements, views and rays as wished."""
 
     def __init__(
         self, field: LightField, samples: Samples, threads: int = 0, seed: int = 0, without: Collection[str] = ()

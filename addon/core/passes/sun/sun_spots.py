@@ -137,14 +137,16 @@ class Edges:
         self.a, k = np.nonzero(np.isfinite(distance[:, 1:]))
         self.b = neighbour[:, 1:][self.a, k]
 
-    def _differences(
+    def _difference(
         self, a: np.ndarray, b: np.ndarray, contribution: np.ndarray | float = 0.0, strength: float = 0.0
-    ) -> np.ndarray:
-        """Of log albedo between elements at `a` and `b` ((k,) int), each held at a cap, (k,)."""
+    ) -> float:
+        """Mean of log albedo's between elements at `a` and `b` ((k,) int), each held at a cap; 0 if there are none."""
+        if not len(a):
+            return 0.0
         value, clipped = self.spots.log_albedo(contribution, strength), self.spots.clipped
         difference = value[a] - value[b]
         difference[(clipped[a] & (difference < 0)) | (clipped[b] & (difference > 0))] = 0
-        return np.minimum(np.abs(difference), LIGHT_FIT.cap)
+        return float(np.minimum(np.abs(difference), LIGHT_FIT.cap).mean())
 
     def _two_sides(self, direction: np.ndarray, lit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What a direction lights ((m,) bool) and the nearest in its shade, all off the shadow's edge, (k,) int each.
@@ -152,35 +154,26 @@ class Edges:
         Beside the edge the lit look dark, and so are the last to be clipped, the others bright. Where sun falls on
         bars and reveals alone nothing is as far from an edge, and what is nearer has to do.
         """
+        place = self.spots.place
         for margin in (SUN.margin, SUN.margin / 2, SUN.margin / 4):
-            a, b = self._by_margin(direction, lit, margin)
+            lit_around = self.spots.lit_around(direction, margin)
+            bright = np.flatnonzero(lit & lit_around.all(0))
+            shade = np.flatnonzero(~lit & ~lit_around.any(0) & ~self.spots.clipped)
+            distance, nearest = cKDTree(place[shade]).query(place[bright], distance_upper_bound=SUN.near)
+            near = np.isfinite(distance)
+            a, b = bright[near], shade[nearest[near]]
             if len(a) >= LEVELS.enough:
                 break
         return a, b
 
-    def _by_margin(self, direction: np.ndarray, lit: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        spots = self.spots
-        lit_around = spots.lit_around(direction, margin)
-        bright = np.flatnonzero(lit & lit_around.all(0))
-        shade = np.flatnonzero(~lit & ~lit_around.any(0) & ~spots.clipped)
-        if not len(bright) or not len(shade):
-            return np.zeros(0, int), np.zeros(0, int)
-        place = spots.place
-        distance, nearest = cKDTree(place[shade]).query(place[bright], distance_upper_bound=SUN.near)
-        near = np.isfinite(distance)
-        return bright[near], shade[nearest[near]]
-
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         """A sun, with the mean difference of neighbours under it."""
-        return Guess(direction, self._mean(self.spots.contribution(direction, radius), strength), strength, radius)
+        cost = self._difference(self.a, self.b, self.spots.contribution(direction, radius), strength)
+        return Guess(direction, cost, strength, radius)
 
     def without_sun(self) -> float:
         """The mean difference of neighbours without a sun."""
-        return self._mean(0.0, 0.0)
-
-    def _mean(self, contribution: np.ndarray | float, strength: float) -> float:
-        left = self._differences(self.a, self.b, contribution, strength)
-        return float(left.mean()) if len(left) else 0.0
+        return self._difference(self.a, self.b)
 
     def across(self, guess: Guess) -> tuple[float, float]:
         """Mean difference of the neighbours that are on two sides of a shadow's edge, without the sun and with it."""
@@ -193,11 +186,9 @@ class Edges:
         return self._compared(*self._two_sides(guess.direction, self.spots.contribution(guess.direction) > 0), guess)
 
     def _compared(self, a: np.ndarray, b: np.ndarray, guess: Guess) -> tuple[float, float]:
-        """Mean difference between elements at `a` and `b` without the sun and with it; 0 if there are none."""
-        if not len(a):
-            return 0.0, 0.0
-        left = self._differences(a, b, self.spots.contribution(guess.direction, guess.radius), guess.strength)
-        return float(self._differences(a, b).mean()), float(left.mean())
+        """Mean difference between elements at `a` and `b` without the sun and with it."""
+        contribution = self.spots.contribution(guess.direction, guess.radius)
+        return self._difference(a, b), self._difference(a, b, contribution, guess.strength)
 
     def contrast(self, direction: np.ndarray) -> Guess:
         """How much brighter what a direction lights is than neighbours in its shade: the cost is less their z-score.

@@ -110,8 +110,6 @@ def find_light(
         Of the unseen objects, those that surely are lamps.
     before : Light, optional
         What was found in the same room without its sun, or of its mixed lamps.
-    without : collection of str
-        Passes left out.
     """
     original, mixed = field, before.mixed if before is not None else ()
     if before is not None:
