@@ -138,17 +138,11 @@ def light_evidence(findings: Findings, relative_error: np.ndarray) -> LightEvide
 
 
 def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Standard error of log E at each spot, (k,), the same all over a group.
+    """Standard error of log E at each spot, (k,), the same all over a group, by log(E checked / E) of both checks.
 
+    A `group` ((k,) int) is twice the object_id, and one more where the spot was seen: E of the unseen is a rough guess.
     Robust, as a contact shadow that fell between the shading points must not speak for a whole wall: from the share
     of 68 % that lies within one standard deviation, for the checks' deviations and for the checks' own noise.
-
-    Parameters
-    ----------
-    group : (k,) int
-        Twice the object_id, and one more where the spot was seen: E of the unseen is a rough guess.
-    a, b : (k,) float
-        log(E checked / E) of both checks.
     """
     result = np.empty(len(group))
     by_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..groups import by_label, by_number
+from ..groups import by_label
 from ..passes.albedo.albedo import MEASURED
 from ..scene.atlas import Atlas
 from ..scene.visibility import EDGE
@@ -107,10 +107,10 @@ def by_object(findings: Findings, value: np.ndarray) -> tuple[np.ndarray, np.nda
 def gloss_error(findings: Findings) -> np.ndarray:
     """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
     atlas, specular, irradiance = findings.surface.atlas, findings.specular, findings.irradiance
-    result, elements = np.full(len(atlas), CALIBRATION.left, np.float32), by_number(atlas.object_id)
+    result = np.full(len(atlas), CALIBRATION.left, np.float32)
     for m in findings.materials:
         if m.model.layered:
-            indices = elements.get(m.object_id, np.zeros(0, np.int64))
+            indices = atlas.elements_of(m.object_id)
             taken = np.pi * specular[indices].mean(1) / np.maximum(irradiance[indices].mean(1), 1e-20)
             known = findings.albedo.origin[indices] == MEASURED
             if known.any():

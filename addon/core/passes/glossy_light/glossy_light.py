@@ -12,7 +12,6 @@ from collections.abc import Collection
 import numpy as np
 
 from ...brdf.material import ObjectMaterial
-from ...groups import by_number
 from ...light.emitters import bright_triangles
 from ...light.environment import Environment
 from ...light.field import LightField
@@ -50,12 +49,11 @@ class Excess(LightField):
         self._inside = specular.copy()
         alpha, kind = np.zeros(len(room.atlas), np.float32), np.zeros(len(room.atlas), np.int8)
         self._f0, microfacets = np.zeros((len(room.atlas), 3), np.float32), []
-        elements_of, empty = by_number(room.atlas.object_id), np.zeros(0, np.int64)
         followed = {mirror.object_id for mirror in room.mirrors}
         for material in materials:
             if material.model.microfacets is None or material.alpha is None or material.object_id in followed:
                 continue
-            elements = elements_of.get(material.object_id, empty)
+            elements = room.atlas.elements_of(material.object_id)
             alpha[elements] = max(float(material.alpha), float(GRID[0]))
             if material.model.microfacets not in microfacets:
                 microfacets.append(material.model.microfacets)

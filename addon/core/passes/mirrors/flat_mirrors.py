@@ -85,12 +85,7 @@ def find_mirrors(
 def _fit_mirror(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Normal and F0 ((3,) float32 each) of the mirror that these observations see, None if they see none.
 
-    Parameters
-    ----------
-    facing : (m, 3) float32
-        Normals of their elements.
-    normal : (3,) float32
-        Of the mesh's plane.
+    `facing` ((m, 3)) are the normals of their elements, `normal` is the mesh's.
     """
     deviation, own_deviation, correlation, f0 = views.compare(facing)
     alike = deviation < own_deviation and correlation > MIRRORS.together

@@ -276,18 +276,9 @@ def _through_cells(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What comes to m elements from outside: by `windows` from the sky, else by the other cells of the box.
 
-    Elements that are `shut` ((n,) bool) let through what comes from there.
-
-    Returns
-    -------
-    unknown : (CELLS,) int
-        That each cell belongs to.
-    through : (m, u) float64
-        E from each of those at radiance 1.
-    from_sky : (m, 3) float64
-        E from the sky that frames tell.
-    by_part : (m, p) float64
-        E from each clipped `part` ((h, 2h) int) at radiance 1.
+    Elements that are `shut` ((n,) bool) let through what comes from there. Gives the unknown that each cell belongs to,
+    (CELLS,) int; E from each of those at radiance 1, (m, u); E from the sky that frames tell, (m, 3); and E from each
+    clipped `part` ((h, 2h) int) at radiance 1, (m, p), float64 all.
     """
     side, row, column = np.unravel_index(np.arange(CELLS), (6, GATHER.cells, GATHER.cells))
     edge = -(-GATHER.cells // MISSING.merged)

@@ -246,10 +246,9 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = 
 def _fit(jacobian: np.ndarray, residual: np.ndarray, gradient_weight: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """The motion, (6,), by robust least squares under a prior; the last column of `jacobian` is a gain's.
 
-    `expected` ((6,)) are the prior's standard deviations.
-
-    `gradient_weight` ((m,)) weighs the pixels in the estimate of the residuals' spread: where the picture is flat they
-    are small wherever the camera is, and would make those at edges look like outliers.
+    `expected` ((6,)) are the prior's standard deviations. `gradient_weight` ((m,)) weighs the pixels in the estimate of
+    the residuals' spread: where the picture is flat they are small wherever the camera is, and would make those at
+    edges look like outliers.
     """
     prior = np.diag(np.r_[expected**-2, 0])
     solution = np.zeros(7)

@@ -53,8 +53,7 @@ class Choice:
     @property
     def lobe(self) -> LobeFit:
         """`fit`, which a model with a lobe has."""
-        if self.fit is None:
-            raise ValueError(f"the model {self.model.name} was taken without a lobe")
+        assert self.fit is not None
         return self.fit
 
 

@@ -115,13 +115,7 @@ class SpecularPart:
     def _smoothed(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
         """The mean of an object's cells nearby, of one ray's place each, at places ((2, k), in cells): (k, 3) float32.
 
-        Parameters
-        ----------
-        part : (m, 3) float32
-        cell : (2, m) int
-            Row and column.
-        place : (2, k) float, optional
-            The cells' own where not given.
+        `part` ((m, 3)) is of each `cell` ((2, m) int: row and column); without `place` at the cells themselves.
         """
         low = cell.min(1)
         planes = np.zeros((4, *(cell.max(1) + 1 - low)), np.float32)
