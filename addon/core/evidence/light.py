@@ -108,13 +108,7 @@ def unsure_light(findings: Findings, relative_error: np.ndarray) -> LightField:
 
 
 def light_evidence(findings: Findings, relative_error: np.ndarray) -> LightEvidence:
-    """Check E at some elements and carry its error over to all.
-
-    Parameters
-    ----------
-    relative_error : (n,) float32
-        Relative error of each element's albedo, the light aside.
-    """
+    """Check E at some elements and carry its error over to all; `relative_error` ((n,)) is albedo's, but for light."""
     field, shading, lit, seed = findings.field, findings.shading, findings.lit_diffuse, findings.seed
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, LEVELS.sample, seed)

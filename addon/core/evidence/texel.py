@@ -87,10 +87,7 @@ def texel_evidence(findings: Findings, intrinsic: np.ndarray, light: LightEviden
 def by_object(findings: Findings, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of what was measured of each element's object: spread of log albedo, median of a value, share of the area.
 
-    Returns
-    -------
-    (n,) float32 each
-        0 for objects of which nothing was measured.
+    (n,) float32 each; 0 for objects of which nothing was measured.
     """
     atlas, albedo = findings.surface.atlas, findings.albedo
     spread, median, share = np.zeros((3, len(atlas)), np.float32)

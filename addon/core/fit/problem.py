@@ -63,8 +63,7 @@ class DenseProblem:
     Attributes
     ----------
     I : (3, 1, v, g) float32
-        Radiance over the element's own level: noise and misregistration
-        grow with radiance.
+        Radiance over the element's own level: noise and misregistration grow with radiance.
     there : (v, g) float32
         1 where there is an observation, else 0.
     spread : (v, g) float32 or None
@@ -137,12 +136,8 @@ class DenseProblem:
         """`spread` under each of several lobes with psi ((3, h)), (h, v, g) float32.
 
         By what a view shows of the lobe beyond the view that shows least of it: what all of an element's views show
-        counts as its diffuse part, be it off or not.
-
-        Parameters
-        ----------
-        scale : float
-            Standard deviation of the residual with no lobe, relative to the element's level.
+        counts as its diffuse part, be it off or not. `scale` is the standard deviation of the residual with no lobe,
+        relative to the element's level.
         """
         visible = (np.asarray(psi, np.float32)[:, :, None, None] * lobe.A + lobe.B).mean(0)
         return _spread(visible - np.where(self.there > 0, visible, np.inf).min(1, keepdims=True), scale)
@@ -150,11 +145,7 @@ class DenseProblem:
     def expecting(self, phi: float, psi: np.ndarray, scale: float) -> DenseProblem:
         """The same with one `spread` for all hypotheses, which are compared so: by all that a lobe shows.
 
-        Parameters
-        ----------
-        phi, psi : float, (3,) float
-        scale : float
-            See `own_spread`.
+        psi is of each channel, (3,), `scale` as in `own_spread`.
         """
         lobe, dense = self.lobe(self.at(phi)), copy.copy(self)
         visible = np.asarray(psi, np.float32)[:, None, None] * lobe.A[:, 0] + lobe.B[:, 0]

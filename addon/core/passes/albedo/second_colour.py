@@ -35,7 +35,7 @@ def shrunk_to_second_colour(
     reference: np.ndarray,
     reference_error: np.ndarray,
 ) -> np.ndarray:
-    """Log albedo of measured elements, shrunk to the other colours around them as far as those are likelier.
+    """Log albedo of measured elements ((m, 3)), shrunk to the other colours around them as far as those are likelier.
 
     Measured with it (score by `scripts/qa_rooms`, dB): bathrooms +.36 and +.45, a hall +.36, other rooms +.0 to +.05,
     the living room -.10.
@@ -54,10 +54,6 @@ def shrunk_to_second_colour(
         Each element's cell.
     reference, reference_error : (r, 3) and (r,)
         Albedo above 0, and relative standard error.
-
-    Returns
-    -------
-    (m, 3)
     """
     ground, width, neighbours = np.exp(prior.median), prior.width, prior.neighbours
     other = np.empty(neighbours.shape, bool)

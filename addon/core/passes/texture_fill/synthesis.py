@@ -223,10 +223,6 @@ def smooth_mean(picture: np.ndarray, known: np.ndarray, sigma: float) -> np.ndar
     known : (h, w) bool
     sigma : float
         Cells.
-
-    Returns
-    -------
-    (h, w, c) float32
     """
     edge = max(int(sigma / 4), 1)
     share, total = block_mean(known, edge), block_mean(picture * known[..., None], edge)
