@@ -4,7 +4,7 @@
 def classes() -> tuple[type, ...]:
     """All classes to register, in the order of menus and panels."""
     from . import manual, menus
-    from .base import job_operator
+    from .base import operator
     from .correct import correct
     from .correct import panel as correct_panel
     from .preferences import ScanRelightPreferences
@@ -20,7 +20,7 @@ def classes() -> tuple[type, ...]:
         members = [(module, cls) for module in modules for name, cls in vars(module).items() if name.startswith(starts)]
         return [cls for module, cls in members if cls.__module__ == module.__name__]
 
-    modules = stages, job_operator, room, find, files, look, lights, view, export, correct, manual, menus
+    modules = stages, operator, room, find, files, look, lights, view, export, correct, manual, menus
     operators = classes_of(*modules, kinds=("OT", "MT", "FH"))
     panels = classes_of(
         *(find, panel_capture, panel_recover, results_panel, correct_panel, look, relight_panel, export),

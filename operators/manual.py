@@ -4,6 +4,8 @@ from pathlib import Path
 
 import bpy
 
+from .base.properties import string_property
+
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 """Installed: HTML pages. In a checkout: the Markdown that they are made of."""
 MAP = (
@@ -55,9 +57,7 @@ class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
 
     bl_label = "Scan Relight Manual"
 
-    page: bpy.props.StringProperty(
-        name="Page", description="Which page, and which part of it", default="guide", options={"SKIP_SAVE"}
-    )
+    page: string_property("Page", "Which page, and which part of it", default="guide", options={"SKIP_SAVE"})
 
     def execute(self, context):
         """Open it; in the background only report its address."""

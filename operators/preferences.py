@@ -10,8 +10,8 @@ from ..addon.bridge.results import default_folders
 from ..addon.core.kinds import Shown
 from . import keymaps
 from .base.job_operator import areas
-from .base.operator import folder_property
 from .base.panel import fields
+from .base.properties import float_property, folder_property, int_property
 
 PACKAGE = default_folders.PACKAGE
 
@@ -26,12 +26,10 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         "Where results go whose folder is not chosen and whose .blend was never saved; empty takes 'Scan "
         "Relight' among your documents. A saved .blend has its results beside it",
     )
-    threads: bpy.props.IntProperty(
-        name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64
-    )
-    memory_limit: bpy.props.FloatProperty(
-        name="Memory Limit (GB)",
-        description="Memory that a run keeps to, by working in smaller blocks; it is stopped where that can't be. 0 "
+    threads: int_property("Threads", "Processor threads that a run may take; 0 takes all", min=0, soft_max=64)
+    memory_limit: float_property(
+        "Memory Limit (GB)",
+        "Memory that a run keeps to, by working in smaller blocks; it is stopped where that can't be. 0 "
         "takes 70 % of what the machine has free. A run is a process of its own: Blender's own memory does not count",
         min=0.0,
         soft_max=256.0,
@@ -56,8 +54,7 @@ def preferences() -> ScanRelightPreferences | None:
 
 def results_folder() -> Path:
     """The folder of results without a chosen one whose .blend was never saved; not created here."""
-    addon_preferences = preferences()
-    return default_folders.results_folder(addon_preferences.results_folder if addon_preferences is not None else "")
+    return default_folders.results_folder(getattr(preferences(), "results_folder", ""))
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:

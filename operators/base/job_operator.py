@@ -230,27 +230,6 @@ def active() -> jobs.Job | None:
     return job if job is not None and job.facts.get("phase") != "end" else None
 
 
-class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
-    """Stop the run within a second; finished stages are kept and the next run goes on from them"""
-
-    bl_label = "Stop Recovery"
-
-    @classmethod
-    def poll(cls, context):
-        if active() is None:
-            cls.poll_message_set("No run is going on.")
-            return False
-        return True
-
-    def execute(self, context):
-        """Request it; the operator that follows the job handles its end."""
-        job = active()
-        job.stop()
-        job.facts["unwanted"] = True
-        redraw(context)
-        return {"FINISHED"}
-
-
 @bpy.app.handlers.persistent
 def forget_job(*_) -> None:
     """Another file is loaded: the run that was started for this one ends."""

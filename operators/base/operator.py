@@ -1,14 +1,13 @@
-"""Shared by all operators: `poll`, errors as one sentence, file browser properties, rays under the mouse."""
+"""Shared by all operators: `poll`, errors as one sentence, the file browser, rays under the mouse; stopping a run."""
 
 from collections.abc import Callable
-from functools import partial
 
 import bpy
 from bpy_extras import view3d_utils
 
 from ...addon.console import unexpected
 from ...addon.core.errors import ScanRelightError
-from .job_operator import active, under_mouse
+from .job_operator import active, redraw, under_mouse
 
 REPORTED = "Error: "
 """Prefix of an operator's error where Blender raises it as an exception."""
@@ -109,16 +108,19 @@ class Choosing:
         return {"RUNNING_MODAL"}
 
 
-def _path(subtype: str, name: str, description: str, *options: str, **kwargs):
-    return bpy.props.StringProperty(name=name, description=description, subtype=subtype, options=set(options), **kwargs)
+@needs(lambda context: active() is not None, "No run is going on.")
+class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
+    """Stop the run within a second; finished stages are kept and the next run goes on from them"""
 
+    bl_label = "Stop Recovery"
 
-folder_property, file_property = partial(_path, "DIR_PATH"), partial(_path, "FILE_PATH")
-"""Properties for a path: label, tooltip, options, and other arguments of `StringProperty`."""
-FOLDERS = bpy.props.BoolProperty(
-    name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
-)
-"""Property that makes the file browser show folders only."""
+    def execute(self, context):
+        """Request it; the operator that follows the job handles its end."""
+        job = active()
+        job.stop()
+        job.facts["unwanted"] = True
+        redraw(context)
+        return {"FINISHED"}
 
 
 def mouse_ray(context, event):

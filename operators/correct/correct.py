@@ -17,6 +17,7 @@ from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator
 from ..base.operator import NAVIGATION_EVENTS, AtOnce, OneSentence, has_scene, mouse_ray, needs, no_run, object_mode
+from ..base.properties import bool_property, enum_property, int_property, vector_property
 from .props import ALBEDO, SMOOTH_ANGLE, STATEMENTS
 
 
@@ -128,7 +129,7 @@ class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
 
     bl_label = "This Is"
 
-    model: bpy.props.EnumProperty(name="Model", description="What they are", items=STATEMENTS)
+    model: enum_property("Model", "What they are", STATEMENTS)
     asks_for = "model"
 
     @classmethod
@@ -153,9 +154,9 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
 
     bl_label = "The Same As"
 
-    object_id: bpy.props.IntProperty(
-        name="Object",
-        description="Number of the other object in the capture; -1 takes the active one",
+    object_id: int_property(
+        "Object",
+        "Number of the other object in the capture; -1 takes the active one",
         default=-1,
         min=-1,
         options={"SKIP_SAVE"},
@@ -187,14 +188,11 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
 
     bl_label = "Back to What Was Found"
 
-    key: bpy.props.EnumProperty(
-        name="Value",
-        description="What is taken back",
+    key: enum_property(
+        "Value",
+        "What is taken back",
+        [("all", "All", "Everything"), *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items())],
         default="all",
-        items=[
-            ("all", "All", "Everything"),
-            *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items()),
-        ],
     )
 
     @classmethod
@@ -223,9 +221,7 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
     bl_label = "Smooth by Angle"
 
     angle: SMOOTH_ANGLE
-    everything: bpy.props.BoolProperty(
-        name="Whole Room", description="All recovered objects of the scene, not the selected ones alone"
-    )
+    everything: bool_property("Whole Room", "All recovered objects of the scene, not the selected ones alone")
 
     def work(self, context):
         objects = filter(corrections.correctable, context.scene.objects) if self.everything else chosen(context)
@@ -278,16 +274,10 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
     bl_label = "Pick White Spot"
 
     albedo: ALBEDO
-    origin: bpy.props.FloatVectorProperty(
-        name="From",
-        description="Where the ray to the spot begins, in metres",
-        size=3,
-        subtype="TRANSLATION",
-        options={"SKIP_SAVE"},
+    origin: vector_property(
+        "From", "Where the ray to the spot begins, in metres", subtype="TRANSLATION", options={"SKIP_SAVE"}
     )
-    direction: bpy.props.FloatVectorProperty(
-        name="Direction", description="Of the ray to the spot", size=3, subtype="DIRECTION", options={"SKIP_SAVE"}
-    )
+    direction: vector_property("Direction", "Of the ray to the spot", subtype="DIRECTION", options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
         self._picking = True
@@ -335,9 +325,7 @@ class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
 
     bl_label = "Paint"
 
-    masked: bpy.props.BoolProperty(
-        name="Only Unseen Spots", description="Protect what any frame saw by a stencil mask", default=True
-    )
+    masked: bool_property("Only Unseen Spots", "Protect what any frame saw by a stencil mask", default=True)
 
     def work(self, context):
         obj = context.view_layer.objects.active
@@ -371,9 +359,7 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
 
     bl_label = "Restore"
 
-    discard: bpy.props.BoolProperty(
-        name="Forget What Was Painted", description="Take it out of your image too; else Paint shows it again"
-    )
+    discard: bool_property("Forget What Was Painted", "Take it out of your image too; else Paint shows it again")
 
     def work(self, context):
         count = unseen.restore(chosen(context), self.discard)

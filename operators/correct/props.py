@@ -11,6 +11,7 @@ from ...addon.bridge.corrections import corrections
 from ...addon.core.brdf.lambertian import LAMBERTIAN
 from ...addon.core.brdf.registry import find_or_lambertian, models
 from ...addon.core.errors import ScanRelightError
+from ..base.properties import bool_property, enum_property, float_property, vector_property
 
 _GIVEN = [brdf for brdf in models() if brdf.can_be_given]
 _SORTED = sorted(_GIVEN, key=lambda brdf: (brdf.gives_light, brdf.has_diffuse, not brdf.has_lobe))
@@ -19,20 +20,18 @@ _ITEMS = [
     (brdf.name, brdf.label, brdf.text, number)
     for number, brdf in enumerate((*_GIVEN, *(brdf for brdf in models() if not brdf.can_be_given)))
 ]
-SMOOTH_ANGLE = bpy.props.FloatProperty(
-    name="Angle",
-    description="Edges where faces meet at a greater angle stay sharp",
+SMOOTH_ANGLE = float_property(
+    "Angle",
+    "Edges where faces meet at a greater angle stay sharp",
     subtype="ANGLE",
     min=0.0,
     max=radians(180),
     default=radians(30),
 )
-ALBEDO = bpy.props.FloatVectorProperty(
-    name="Albedo",
-    description="Share of the light that it reflects, for each channel, linear: white wall paint has "
-    "about 0.80, a grey card 0.18",
+ALBEDO = vector_property(
+    "Albedo",
+    "Share of the light that it reflects, for each channel, linear: white wall paint has about 0.80, a grey card 0.18",
     subtype="COLOR",
-    size=3,
     min=0.01,
     max=1.0,
     default=(0.8, 0.8, 0.8),
@@ -83,16 +82,16 @@ def _give_colour(group, value) -> None:
 class ScanRelightCorrection(bpy.types.PropertyGroup):
     """`Object.scan_relight_correct`."""
 
-    model: bpy.props.EnumProperty(
-        name="Model",
-        description="How the surface reflects",
-        items=_ITEMS,
+    model: enum_property(
+        "Model",
+        "How the surface reflects",
+        _ITEMS,
         get=lambda self: next(item[3] for item in _ITEMS if item[0] == _value(self, "model", LAMBERTIAN.name)),
         set=lambda self, value: value < len(_GIVEN) and _give(self, model=_ITEMS[value][0]),
     )
-    roughness: bpy.props.FloatProperty(
-        name="Roughness",
-        description="Of the highlight: 0 is a mirror, 1 hardly shows any",
+    roughness: float_property(
+        "Roughness",
+        "Of the highlight: 0 is a mirror, 1 hardly shows any",
         min=0.0,
         max=1.0,
         subtype="FACTOR",
@@ -100,9 +99,9 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
         get=lambda self: _value(self, "roughness", 0.5),
         set=lambda self, value: _give(self, roughness=value),
     )
-    f0: bpy.props.FloatProperty(
-        name="F0",
-        description="Share of the light that the surface mirrors when looked at straight on; most plastics, "
+    f0: float_property(
+        "F0",
+        "Share of the light that the surface mirrors when looked at straight on; most plastics, "
         "lacquers and woods have 0.04",
         min=0.0,
         max=0.9,
@@ -112,12 +111,11 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
         get=_f0,
         set=lambda self, value: _give(self, f0=value),
     )
-    colour: bpy.props.FloatVectorProperty(
-        name="Base Color",
-        description="Mean colour of the object, linear; a texture keeps its detail and is scaled. "
+    colour: vector_property(
+        "Base Color",
+        "Mean colour of the object, linear; a texture keeps its detail and is scaled. "
         "Of a metal the colour of its reflection",
         subtype="COLOR",
-        size=3,
         min=0.0,
         max=1.0,
         get=_colour,
@@ -128,15 +126,14 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
 class ScanRelightCorrecting(bpy.types.PropertyGroup):
     """`Scene.scan_relight_correct`."""
 
-    refit_automatically: bpy.props.BoolProperty(
-        name="Refit Automatically",
-        description="After a statement such as This Is Metal fit the objects again at "
-        "once; values set by hand wait for Refit",
+    refit_automatically: bool_property(
+        "Refit Automatically",
+        "After a statement such as This Is Metal fit the objects again at once; values set by hand wait for Refit",
         default=True,
     )
-    all_selected: bpy.props.BoolProperty(
-        name="All Selected",
-        description="A value that is set here goes to all selected objects, not to the active one alone",
+    all_selected: bool_property(
+        "All Selected",
+        "A value that is set here goes to all selected objects, not to the active one alone",
         default=True,
     )
     like: bpy.props.PointerProperty(

@@ -7,18 +7,9 @@ import bpy
 
 from ...addon.core.errors import BadInputError
 from ...addon.core.io import folder as folders
-from ..base.operator import (
-    FOLDERS,
-    AtOnce,
-    Choosing,
-    OneSentence,
-    file_property,
-    folder_property,
-    free_scene,
-    has_scene,
-    no_run,
-)
+from ..base.operator import AtOnce, Choosing, OneSentence, free_scene, has_scene, no_run
 from ..base.panel import SidebarPanel, fields
+from ..base.properties import FOLDERS, enum_property, file_property, folder_property, string_property
 from . import room
 from .settings_props import preset_property
 
@@ -80,7 +71,7 @@ class FileOperator(OneSentence):
         type=bpy.types.OperatorFileListElement,
         options={"HIDDEN", "SKIP_SAVE"},
     )
-    then: bpy.props.EnumProperty(name="Then", description="What is done with a scan", items=NEXT)
+    then: enum_property("Then", "What is done with a scan", NEXT)
     preset: preset_property("What all settings of a recovery start from")
 
     def execute(self, context):
@@ -116,9 +107,7 @@ class SCAN_RELIGHT_OT_open_capture(Choosing, FileOperator, bpy.types.Operator):
     bl_label = "Import Scan Relight Capture"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    filter_glob: bpy.props.StringProperty(
-        name="Filter", description="Which files are shown", default=FILTER, options={"HIDDEN"}
-    )
+    filter_glob: string_property("Filter", "Which files are shown", default=FILTER, options={"HIDDEN"})
 
     def draw(self, context):
         layout = fields(self.layout)

@@ -6,7 +6,7 @@ import bpy
 
 from ...addon.core.io.formats import FORMATS, MATERIALS, SHAPE
 from ...addon.core.io.layout import Reading
-from ..base.operator import file_property
+from ..base.properties import bool_property, enum_property, file_property, string_property
 from ..translations import OWN
 
 FOUND, FILE = "FOUND", "FILE"
@@ -30,25 +30,17 @@ SEGMENTS = (
 class ReadingProps:
     """The properties, for operators and property groups."""
 
-    reading_format: bpy.props.EnumProperty(
-        name="Format", description="Layout of the capture's folder", items=FORMAT_ITEMS, default=FOUND
-    )
+    reading_format: enum_property("Format", "Layout of the capture's folder", FORMAT_ITEMS, default=FOUND)
     reading_mesh: file_property(
         "Mesh", "The mesh, where it is not the one that the format names", translation_context=OWN
     )
-    reading_outside: bpy.props.BoolProperty(
-        name="Files Outside", description="Let the capture's files name others outside of its folder"
-    )
-    reading_transfer: bpy.props.EnumProperty(
-        name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES
-    )
+    reading_outside: bool_property("Files Outside", "Let the capture's files name others outside of its folder")
+    reading_transfer: enum_property("Picture Curve", "Curve of pictures of 8 and 16 bits", CURVES)
     reading_exposures: file_property("Exposures", "CSV file with the exposure of each frame: lines of name, exposure")
-    reading_convention: bpy.props.StringProperty(
-        name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"
+    reading_convention: string_property(
+        "Poses", "Name of a correction of all poses, as the check of the capture proposes it"
     )
-    reading_segments: bpy.props.EnumProperty(
-        name="Objects", description="What tells which object each face of the mesh belongs to", items=SEGMENTS
-    )
+    reading_segments: enum_property("Objects", "What tells which object each face of the mesh belongs to", SEGMENTS)
     reading_segments_file: file_property(
         "Segments", "A number for each face of the mesh (.txt, .csv or .npy), or the mesh painted by objects (.ply)"
     )
@@ -64,11 +56,7 @@ def visible_names(owner) -> list[str]:
 
 def reading(owner) -> Reading:
     """`owner`'s properties as the argument of `read_capture`."""
-
-    def import_mesh(path: Path):
-        from ...addon.bridge.data.import_mesh import import_mesh as through_blender
-
-        return through_blender(path)
+    from ...addon.bridge.data.import_mesh import import_mesh
 
     def file(path: str) -> Path | None:
         return Path(bpy.path.abspath(path)) if path else None

@@ -8,6 +8,7 @@ from ...addon.bridge.scene import parts
 from ...addon.bridge.scene.parts import rooms
 from ...addon.core.errors import BadInputError
 from ..base.operator import AtOnce, NothingDone, has_scene, needs, object_mode
+from ..base.properties import bool_property, enum_property
 from ..results.look import needs_recovered
 
 
@@ -52,10 +53,8 @@ class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
     bl_label = "Link into Scene"
     remarks = "INFO"
 
-    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=scene_items)
-    outside: bpy.props.BoolProperty(
-        name="With Its Outside", description="Give that scene the room's world and exposure, too"
-    )
+    scene: enum_property("Scene", "Where the room is linked", scene_items)
+    outside: bool_property("With Its Outside", "Give that scene the room's world and exposure, too")
 
     def work(self, context):
         from ...addon.bridge.room.bring import link_room
@@ -75,8 +74,8 @@ class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
     bl_label = "Mark Materials as Assets"
     remarks = "INFO"
 
-    selected_only: bpy.props.BoolProperty(name="Selected Only", description="Only what the selected objects wear")
-    clear: bpy.props.BoolProperty(name="Take Out", description="They are no assets any more", options={"SKIP_SAVE"})
+    selected_only: bool_property("Selected Only", "Only what the selected objects wear")
+    clear: bool_property("Take Out", "They are no assets any more", options={"SKIP_SAVE"})
 
     def work(self, context):
         objects = look.recovered(context.scene)
@@ -106,9 +105,7 @@ class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
 
     bl_label = "Restore Materials"
 
-    selected_only: bpy.props.BoolProperty(
-        name="Selected Only", description="Leave the objects that are not selected as they are"
-    )
+    selected_only: bool_property("Selected Only", "Leave the objects that are not selected as they are")
 
     def work(self, context):
         from ...addon.bridge.own_scene.restore import restore

@@ -7,7 +7,7 @@ import bpy
 from ...addon.core.errors import StorageError
 from ...addon.core.settings import PRESETS
 from ...addon.settings_info import setting_infos
-from ..base.operator import folder_property
+from ..base.properties import folder_property
 from . import findings
 from .reading_props import ReadingProps
 from .settings_props import COPIES, IMAGES, SettingsProps, preset_property

@@ -17,8 +17,9 @@ from ...addon.leash import MemoryGuard
 from ...addon.settings_info import SettingInfo, setting_infos
 from .. import preferences
 from ..base.job_operator import FOLLOWED, JobOperator
-from ..base.operator import OneSentence, folder_property, free_scene, needs
+from ..base.operator import OneSentence, free_scene, needs
 from ..base.panel import fields
+from ..base.properties import bool_property, enum_property, float_property, folder_property, int_property
 from ..translations import OWN
 from . import reading_props, room
 from .reading_props import ReadingProps
@@ -39,32 +40,32 @@ TARGETS = [
         "The objects that were selected when the scene was captured; what they wear now is kept and can be restored",
     ),
 ]
-IMAGES = bpy.props.EnumProperty(
-    name="Images",
-    description="Where the recovered images are kept",
-    items=[
+IMAGES = enum_property(
+    "Images",
+    "Where the recovered images are kept",
+    [
         ("RESULT", "In the Result Folder", "Refer to the images where they are"),
         ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
         ("PACK", "Packed", "Keep the images within the .blend"),
     ],
 )
-INTO = bpy.props.EnumProperty(
-    name="Into",
-    description="Where the room goes",
-    items=[
+INTO = enum_property(
+    "Into",
+    "Where the room goes",
+    [
         ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
         ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay"),
     ],
 )
-COPIES = bpy.props.BoolProperty(
-    name="Make Copies",
-    description="Where modifiers or instances make an object's faces, put the material onto a "
+COPIES = bool_property(
+    "Make Copies",
+    "Where modifiers or instances make an object's faces, put the material onto a "
     "copy of it and hide the object; without this such objects are left as they are",
 )
-FROM_STAGE = bpy.props.EnumProperty(
-    name="Again From",
-    description="Do this stage and all later ones anew, though they are stored",
-    items=[
+FROM_STAGE = enum_property(
+    "Again From",
+    "Do this stage and all later ones anew, though they are stored",
+    [
         ("NONE", "Nothing", "Go on from what is stored"),
         *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
     ],
@@ -80,12 +81,12 @@ def property_for(info: SettingInfo):
     if info.choices:
         numbers = SAVED_AS.get(info.name, range(len(info.choices)))
         items = [(choice, *choices[choice], number) for choice, number in zip(info.choices, numbers)]
-        return bpy.props.EnumProperty(name=name, description=text, items=items, default=info.default)
-    make = {bool: bpy.props.BoolProperty, int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[info.kind]
-    extra = {} if info.kind is bool else {"min": 0}
-    if info.kind is float:
-        extra["precision"] = 3
-    return make(name=name, description=text, default=info.default, **extra)
+        return enum_property(name, text, items, default=info.default)
+    if info.kind is bool:
+        return bool_property(name, text, default=info.default)
+    if info.kind is int:
+        return int_property(name, text, default=info.default, min=0)
+    return float_property(name, text, default=info.default, min=0, precision=3)
 
 
 class SettingsProps:
@@ -121,8 +122,7 @@ def startable(operator):
 def preset_property(description: str, **kwargs):
     """A property for the name of a preset."""
     items = [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
-    keywords = {"name": "Preset", "description": description, "default": "normal", "translation_context": OWN}
-    return bpy.props.EnumProperty(items=items, **keywords, **kwargs)
+    return enum_property("Preset", description, items, default="normal", translation_context=OWN, **kwargs)
 
 
 @startable
@@ -181,14 +181,10 @@ class StageOperator(SettingsProps, CaptureOperator):
 
     def settings(self) -> Settings:
         """The preset with every setting that is set; threads from the preferences where they are not."""
-        values = {
-            info.name: setting_value(self, info)
-            for info in setting_infos()
-            if self.properties.is_property_set(info.name)
-        }
-        addon_preferences = preferences.preferences()
-        if not values.get("threads") and addon_preferences is not None:
-            values["threads"] = addon_preferences.threads
+        given = (info for info in setting_infos() if self.properties.is_property_set(info.name))
+        values = {info.name: setting_value(self, info) for info in given}
+        if not values.get("threads"):
+            values["threads"] = getattr(preferences.preferences(), "threads", 0)
         return replace(PRESETS[self.preset], **values)
 
     def run(self, context, until: str, **options) -> dict:
@@ -208,8 +204,7 @@ class StageOperator(SettingsProps, CaptureOperator):
     @staticmethod
     def memory_limit() -> float | None:
         """Gigabytes that a run may use; None for most of the free memory."""
-        addon_preferences = preferences.preferences()
-        return (addon_preferences.memory_limit or None) if addon_preferences is not None else None
+        return getattr(preferences.preferences(), "memory_limit", None) or None
 
     def begin(self, context):
         """Start the run as a job of the command line, so that its result is the same."""
@@ -233,7 +228,7 @@ class SceneStageOperator(StageOperator):
     bl_options = {"UNDO", "PRESET"}
     until = WRITE
     import_first = True
-    target: bpy.props.EnumProperty(name="Onto", description="Which objects the materials go onto", items=TARGETS)
+    target: enum_property("Onto", "Which objects the materials go onto", TARGETS)
     images: IMAGES
     copies: COPIES
     into: INTO

@@ -11,8 +11,9 @@ from ...addon.bridge.job.command import command
 from ...addon.bridge.results import default_folders
 from ...addon.core.errors import ScanRelightError
 from .. import preferences
-from ..base.operator import AtOnce, OneSentence, folder_property, has_capture, has_scene, needs
+from ..base.operator import AtOnce, OneSentence, has_capture, has_scene, needs
 from ..base.panel import fields
+from ..base.properties import bool_property, enum_property, folder_property, int_property
 from . import findings, reading_props, room
 from .settings_props import (
     FROM_STAGE,
@@ -138,11 +139,11 @@ class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
 
     bl_label = "Run Recovery"
 
-    target: bpy.props.EnumProperty(
-        name="Operator",
-        description="What is run",
+    target: enum_property(
+        "Operator",
+        "What is run",
+        [(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()],
         default="recover",
-        items=[(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()],
     )
     from_stage: FROM_STAGE
 
@@ -200,10 +201,10 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
         "The capture goes into a folder within this one; empty takes the panel's, or a folder of its own "
         "among the results",
     )
-    cameras: bpy.props.EnumProperty(
-        name="Frames",
-        description="Which cameras took the pictures",
-        items=[
+    cameras: enum_property(
+        "Frames",
+        "Which cameras took the pictures",
+        [
             (
                 "AUTO",
                 "Automatic",
@@ -218,12 +219,10 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
             ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation"),
         ],
     )
-    whole_range: bpy.props.BoolProperty(name="Whole Range", description="Take the scene's frame range", default=True)
-    frame_start: bpy.props.IntProperty(name="Start", description="First frame of the animation", default=1)
-    frame_end: bpy.props.IntProperty(name="End", description="Last frame of the animation", default=250)
-    frame_step: bpy.props.IntProperty(
-        name="Step", description="Frames from one that is taken to the next", default=1, min=1
-    )
+    whole_range: bool_property("Whole Range", "Take the scene's frame range", default=True)
+    frame_start: int_property("Start", "First frame of the animation", default=1)
+    frame_end: int_property("End", "Last frame of the animation", default=250)
+    frame_step: int_property("Step", "Frames from one that is taken to the next", default=1, min=1)
 
     def invoke(self, context, event):
         scene = context.scene

@@ -7,8 +7,9 @@ import bpy
 from ...addon.bridge.export import export
 from ...addon.core.errors import BadInputError
 from ...addon.core.io.folder import capture_name
-from ..base.operator import file_property, needs
+from ..base.operator import needs
 from ..base.panel import SidebarPanel
+from ..base.properties import bool_property, enum_property, file_property
 from .base import SceneOperator
 
 FORMATS = (
@@ -34,10 +35,10 @@ class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     filepath: file_property("File", "What to write", "SKIP_SAVE")
     filter_glob: bpy.props.StringProperty(default="*.glb;*.gltf;*.usd*", options={"HIDDEN"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    format: bpy.props.EnumProperty(name="Format", description="Of a file whose name has no ending", items=FORMATS)
-    scope: bpy.props.EnumProperty(name="Objects", description="What is written", items=SCOPES)
-    lights: bpy.props.BoolProperty(name="Lights", description="Also the lights that were added", default=True)
-    cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera")
+    format: enum_property("Format", "Of a file whose name has no ending", FORMATS)
+    scope: enum_property("Objects", "What is written", SCOPES)
+    lights: bool_property("Lights", "Also the lights that were added", default=True)
+    cameras: bool_property("Camera", "Also the scene's camera")
 
     def invoke(self, context, event):
         if not self.filepath:

@@ -11,7 +11,8 @@ from bl_operators.presets import AddPresetBase
 from ...addon.bridge.light import lamps, outside
 from ...addon.bridge.relight import exposure, lights, probe, setup
 from ...addon.core.errors import BadInputError, ScanRelightError
-from ..base.operator import Choosing, file_property, has_scene, needs
+from ..base.operator import Choosing, has_scene, needs
+from ..base.properties import bool_property, enum_property, file_property, float_property, string_property
 from ..results.look import make_active
 from .base import RelightOperator, follow, has_room
 from .props import AIM, KELVIN, UNIT
@@ -77,7 +78,7 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
 
     bl_label = "Switch All Lamps"
 
-    on: bpy.props.BoolProperty(name="On", description="On or off")
+    on: bool_property("On", "On or off")
 
     def work(self, context):
         for lamp in lamps.find_lamps(context.scene):
@@ -90,7 +91,7 @@ class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
 
     bl_label = "Restore Lamp"
 
-    name: bpy.props.StringProperty(name="Lamp", description="Name of its material, or its class")
+    name: string_property("Lamp", "Name of its material, or its class")
 
     def work(self, context):
         for lamp in lamps.lamp_named(context.scene, self.name):
@@ -114,10 +115,10 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     bl_label = "Add Light"
 
-    preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="In the unit below; of the room's light 1 keeps the scene's exposure readable",
+    preset: enum_property("Light", "What kind of light", PRESETS)
+    strength: float_property(
+        "Strength",
+        "In the unit below; of the room's light 1 keeps the scene's exposure readable",
         min=0.0,
         soft_max=4.0,
         default=1.0,
@@ -187,7 +188,7 @@ class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
 
     bl_label = "Blender's Pictures"
 
-    picture: bpy.props.EnumProperty(name="Picture", description="Which one", items=_studio_items)
+    picture: enum_property("Picture", "Which one", _studio_items)
 
     def work(self, context):
         return put_around(context.scene, self.picture)

@@ -16,7 +16,8 @@ from ...addon.bridge.relight import virtual_object as virtual
 from ...addon.bridge.render_device import current_device
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator, areas
-from ..base.operator import NAVIGATION_EVENTS, file_property, mouse_ray, needs, no_run
+from ..base.operator import NAVIGATION_EVENTS, mouse_ray, needs, no_run
+from ..base.properties import bool_property, enum_property, file_property, int_property
 from ..results.look import make_active
 from ..translations import OWN
 from .base import RelightOperator, SceneOperator
@@ -29,11 +30,9 @@ class SCAN_RELIGHT_OT_match_frame(SceneOperator, bpy.types.Operator):
 
     bl_label = "Look Through Frame"
 
-    index: bpy.props.IntProperty(name="Frame", description="In the capture's order, from 0", min=0)
-    size: bpy.props.BoolProperty(
-        name="Match Render Size", description="Render at the frame's size and with its shape of pixels, too"
-    )
-    step: bpy.props.IntProperty(name="Step", description="So many frames on from the present one; 0 takes the frame")
+    index: int_property("Frame", "In the capture's order, from 0", min=0)
+    size: bool_property("Match Render Size", "Render at the frame's size and with its shape of pixels, too")
+    step: int_property("Step", "So many frames on from the present one; 0 takes the frame")
 
     def work(self, context):
         scene = context.scene
@@ -112,7 +111,7 @@ class SCAN_RELIGHT_OT_virtual_look(OwnObject, bpy.types.Operator):
 
     bl_label = "Give It This Material"
 
-    look: bpy.props.EnumProperty(name="Material", description="Which one", items=LOOKS, translation_context=OWN)
+    look: enum_property("Material", "Which one", LOOKS, translation_context=OWN)
 
     def work(self, context):
         virtual.set_look(context.object, self.look)

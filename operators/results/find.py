@@ -7,8 +7,9 @@ import bpy
 from ...addon.bridge.results import default_folders, find, images
 from ...addon.core.errors import BadInputError
 from .. import preferences
-from ..base.operator import FOLDERS, AtOnce, Choosing, folder_property, needs, no_run
+from ..base.operator import AtOnce, Choosing, needs, no_run
 from ..base.panel import SidebarPanel
+from ..base.properties import FOLDERS, folder_property
 from . import summary
 
 _messages: list[str] = []

@@ -7,6 +7,7 @@ from ...addon.bridge.results import look
 from ...addon.core.errors import BadInputError
 from ..base.operator import AtOnce, has_scene, needs, object_mode
 from ..base.panel import SidebarPanel
+from ..base.properties import bool_property, enum_property, int_property
 
 
 def make_active(context, obj: bpy.types.Object, extend: bool = False) -> None:
@@ -34,8 +35,8 @@ class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
 
     bl_label = "Select Object"
 
-    object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
-    extend: bpy.props.BoolProperty(name="Extend", description="Keep what is selected", options={"SKIP_SAVE"})
+    object_id: int_property("Object", "Number of the object in the capture", min=0)
+    extend: bool_property("Extend", "Keep what is selected", options={"SKIP_SAVE"})
 
     def work(self, context):
         meshes = (obj for obj in context.scene.objects if obj.type == "MESH")
@@ -60,11 +61,10 @@ class SCAN_RELIGHT_OT_look(AtOnce, bpy.types.Operator):
 
     bl_label = "Show Look"
 
-    look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=LOOKS)
-    switch_view: bpy.props.BoolProperty(
-        name="Switch the View",
-        description="Turn viewports that show no materials (Solid, Wireframe) to Material "
-        "Preview, where the look can be seen",
+    look: enum_property("Look", "What the viewport shows", LOOKS)
+    switch_view: bool_property(
+        "Switch the View",
+        "Turn viewports that show no materials (Solid, Wireframe) to Material Preview, where the look can be seen",
         default=True,
     )
 

@@ -16,6 +16,7 @@ from ...addon.core.naming import in_order
 from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
 from ..base.panel import NamedRows, SidebarPanel, places
+from ..base.properties import enum_property, int_property
 from . import summary as results
 from .look import select
 
@@ -54,8 +55,8 @@ class SCAN_RELIGHT_UL_results(ResultRows, bpy.types.UIList):
     """
 
     entries: dict = {}  # by name; result of the last `filter_items`, which runs before the rows are drawn
-    model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
-    order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
+    model: enum_property("Model", "Which objects are listed", MODELS)
+    order: enum_property("Order", "How the list is sorted", ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         self.row(layout, item.name, self.entries.get(item.name, {}))
@@ -134,12 +135,8 @@ def choose_row(scene, row: int) -> None:
 
 def active_row_property():
     """`Scene.scan_relight_row`: follows the active object and is not stored."""
-    return bpy.props.IntProperty(
-        name="Object",
-        description="Click to select the object in the scene",
-        get=active_row,
-        set=choose_row,
-        options={"SKIP_SAVE"},
+    return int_property(
+        "Object", "Click to select the object in the scene", get=active_row, set=choose_row, options={"SKIP_SAVE"}
     )
 
 
