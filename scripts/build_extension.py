@@ -40,7 +40,7 @@ PLATFORMS = {
 """What pip calls a platform, and what its wheels' names end with."""
 
 
-def main() -> int:
+def main() -> None:
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     pythons = sorted({python_of(wheel) for wheel in manifest["wheels"]})
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -70,7 +70,6 @@ def main() -> int:
                 command = [sys.executable, builder, "build", "--source-dir", scratch]
                 subprocess.run([*command, "--output-filepath", archive.resolve()], check=True)
             print(f"{archive}  {archive.stat().st_size / 1e6:.1f} MB")
-    return 0
 
 
 def python_of(wheel: str) -> str:
@@ -155,4 +154,4 @@ def stage(folder: Path, platform: str, wheels: set[str]) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

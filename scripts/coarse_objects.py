@@ -67,7 +67,7 @@ def coarse(
     return host
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("out", type=Path)
@@ -86,8 +86,7 @@ def main() -> int:
     named["objects"] = [entry for entry in named["objects"] if entry["id"] in set(host.values())]
     (options.out / "info_semantic.json").write_text(json.dumps(named, indent=1))
     print(f"{len(host)} objects are {len(set(host.values()))}.")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

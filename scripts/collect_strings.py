@@ -9,7 +9,6 @@ the code in operators/. A sentence with figures in it is listed with '{}' in the
 import argparse
 import ast
 import importlib
-import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -19,7 +18,7 @@ SENTENCES = {"say": 1, "check": 2, "poll_message_set": 0, "translated": 0, "need
 """Functions that take a sentence, and its index among their arguments."""
 
 
-def main() -> int:
+def main() -> None:
     import scan_relight  # the checkout, as `.venv` has it
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -31,7 +30,6 @@ def main() -> int:
         strings -= set(importlib.import_module("scan_relight.operators.translations").texts(arguments.missing))
     print("\n".join(sorted(strings)))
     scan_relight.unregister()
-    return 0
 
 
 def collect() -> set[str]:
@@ -92,4 +90,4 @@ def texts(node: ast.expr) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

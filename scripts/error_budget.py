@@ -37,7 +37,7 @@ def albedo_with(recovery: Recovery, **changed) -> np.ndarray:
     return variant.albedo.rho
 
 
-def main() -> int:
+def main() -> None:
     capture, result = Path(sys.argv[1]), Path(sys.argv[2])
     settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
     with Store(result) as store:
@@ -66,8 +66,7 @@ def main() -> int:
         )
     for name, value in rows:
         sys.stdout.write(f"{value:6.2f} dB  {name}\n")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

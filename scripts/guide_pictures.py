@@ -44,7 +44,7 @@ PARTS = {
 QUALITY = 88
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("capture", type=Path)
     parser.add_argument("--zip", type=Path, required=True)
@@ -71,7 +71,6 @@ def main() -> int:
             screen.close()
             (full / "blender.log").write_text(window.log, encoding="utf-8")
         cut(full, options.out)
-    return 0
 
 
 def play(story: Story, options, home: Path, full: Path) -> None:
@@ -137,4 +136,4 @@ def cut(full: Path, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

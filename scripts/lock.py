@@ -19,7 +19,7 @@ LOCKS = {
 }
 
 
-def main() -> int:
+def main() -> None:
     uv = sys.argv[1] if len(sys.argv) > 1 else "uv"
     for name, options in LOCKS.items():
         lock = FOLDER / f"{name}.txt"
@@ -28,8 +28,7 @@ def main() -> int:
         subprocess.run([*compiled, *plain, f"{name}.in", "-o", lock.name], cwd=FOLDER, check=True)
         lock.write_text(f"# Made by scripts/lock.py from {name}.in; do not edit.\n" + lock.read_text())
         print(lock.relative_to(FOLDER.parent))
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

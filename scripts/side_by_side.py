@@ -8,7 +8,6 @@ and the third, rendered with the same seed. Refit nothing meanwhile: all three f
 """
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -21,7 +20,7 @@ LABELS = "Photograph", "scene.blend", "In the window", "Relit: a lamp off, a sof
 BAR = 30
 
 
-def main() -> int:
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("frame", type=Path)
     parser.add_argument("blends", type=Path, nargs=3, metavar="BLEND")
@@ -41,7 +40,6 @@ def main() -> int:
         print(f"PSNR between scene.blend and the window's scene: {decibels(pictures[1], pictures[2]):.1f} dB")
         print(f"PSNR between the photograph and scene.blend: {decibels(pictures[0], pictures[1]):.1f} dB")
     join(pictures).save(options.out, quality=90, subsampling=0, optimize=True)
-    return 0
 
 
 def open_scene(blend: Path, frame: str, samples: int) -> bpy.types.Scene:
@@ -97,4 +95,4 @@ def join(pictures: list[np.ndarray]) -> Image.Image:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

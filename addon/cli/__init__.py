@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..console import own_console, unexpected
-from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError, check_path
+from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, ScanRelightError, check_path
 from ..core.memory import give_back_at_once
 from ..core.parallel import ONE_BLAS_THREAD
 from ..temporary import use_own_folder
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 if isinstance(path, Path):
                     check_path(path)
         with own_console(keep_others=arguments.debug) as stream:
-            return arguments.function(arguments, stream)
+            return arguments.function(arguments, stream) or EXIT_OK
     except ScanRelightError as error:
         if arguments.debug:
             traceback.print_exc()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from ..core.errors import EXIT_OK, BadInputError
+from ..core.errors import BadInputError
 from ..core.settings import PRESETS
 from .common import add_common
 
@@ -49,7 +49,7 @@ def add_ablation(commands) -> None:
     add_common(parser, ablation_command)
 
 
-def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`benchmark ablation ROOM ... --out DIR`, or with `--list` or `--table FILE`."""
     from ..core.passes.registry import passes
 
@@ -57,7 +57,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         width = max(len(item.name) for item in passes())
         for item in passes():
             print(f"{item.name:{width}}  {item.stage:11}  {item.does}", file=stream)
-        return EXIT_OK
+        return
     if arguments.out is None:
         raise BadInputError("Option --out names the folder of the runs; give it.")
     if arguments.table is not None:
@@ -66,7 +66,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         write_report(arguments.out, arguments.table)
         if not arguments.quiet:
             print(f"Table: {arguments.table}", file=stream)
-        return EXIT_OK
+        return
     if not arguments.rooms:
         raise BadInputError("Name at least one room: a capture with truth/ beside its frames.")
     if min(arguments.seeds) < 0 or arguments.threads < 0:
@@ -87,4 +87,3 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     )
     if not arguments.quiet:
         print(f"Runs: {path}", file=stream)
-    return EXIT_OK

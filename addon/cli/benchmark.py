@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from ..core.errors import EXIT_OK, BadInputError
+from ..core.errors import BadInputError
 from .common import add_common, console_run, needed_packages
 
 
@@ -26,7 +26,7 @@ def add_benchmark(commands) -> None:
     add_common(parser, benchmark_command)
 
 
-def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`benchmark [STAGE ...] --out DIR`."""
     if arguments.seed < 0 or arguments.threads < 0:
         raise BadInputError("Options --seed and --threads take whole numbers of at least 0.")
@@ -47,4 +47,3 @@ def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         if not plots_are_possible():
             print(NO_PLOTS, file=stream)
         print(f"Tables and plots: {arguments.out / 'index.md'}", file=stream)
-    return EXIT_OK

@@ -88,7 +88,10 @@ def _add_leash(parser: argparse.ArgumentParser) -> None:
 
 
 def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True, leash: bool = False) -> None:
-    """Add the options of every command, and the `function` that runs it; `quiet` adds --quiet; `leash`: see `Leash`."""
+    """Add the options of every command, and the `function` that runs it and may return an exit code.
+
+    `quiet` adds --quiet, `leash` what programs that start a run need (see `Leash`).
+    """
     if leash:
         _add_leash(parser)
     if quiet:

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from ..core.errors import EXIT_OK
 from .common import add_common, add_settings, console_run, need, settings_from
 
 DEMO_SIZES = ("tiny", "small", "large")
@@ -24,7 +23,7 @@ def add_demo(commands) -> None:
     add_common(parser, demo_command)
 
 
-def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def demo_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`demo --out RESULT`."""
     settings = settings_from(arguments)
     demo = need("demo.run")
@@ -36,4 +35,3 @@ def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             f"\nOpen {arguments.out / 'scene.blend'} in Blender; the pictures: {arguments.out / 'before_after.png'}",
             file=stream,
         )
-    return EXIT_OK

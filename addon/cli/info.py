@@ -5,7 +5,6 @@ import json
 from pathlib import Path
 from typing import TextIO
 
-from ..core.errors import EXIT_OK
 from ..leash import Leash
 from .common import add_common, add_reading, needed_packages, reading_from
 
@@ -29,7 +28,7 @@ def add_info(commands) -> None:
     add_common(parser, info_command, quiet=False)
 
 
-def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def info_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`info CAPTURE`."""
     from ..core.io.read import describe, read_capture
 
@@ -45,7 +44,7 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         facts["agreement"] = compare(capture, arguments)
     if arguments.json:
         print(json.dumps(facts, indent=1), file=stream)
-        return EXIT_OK
+        return
     extent = " x ".join(f"{length:.2f}" for length in facts["extent_m"])
     sizes = ", ".join(f"{count} of {size}" for size, count in facts["resolutions"].items())
     lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
@@ -68,7 +67,6 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         print(f"  warning    {warning}", file=stream)
     for sentence in facts.get("agreement", {}).get("sentences", ()):
         print(f"  poses      {sentence}", file=stream)
-    return EXIT_OK
 
 
 def compare(capture, arguments: argparse.Namespace) -> dict:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..console import duration
-from ..core.errors import EXIT_OK, BadInputError
+from ..core.errors import BadInputError
 from ..core.stages import RUN_STAGES, WRITE
 from .common import (
     add_common,
@@ -92,7 +92,7 @@ def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str,
         return partial(run_without_scene, request=request, unwrap=arguments.unwrap)
 
 
-def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def recover_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`recover CAPTURE --out RESULT`."""
     settings = settings_from(arguments)
     run = run_from(arguments, until=arguments.until, from_stage=arguments.from_stage)
@@ -104,4 +104,3 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     line = f"Done in {duration(report['seconds'])}: {arguments.out / made}"
     values = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}
     tell_end(arguments, stream, console["listener"], report.get("warnings", ()), line, **values)
-    return EXIT_OK

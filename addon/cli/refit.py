@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TextIO
 
 from ..console import duration
-from ..core.errors import EXIT_OK
 from .common import add_common, console_run, need, tell_end
 
 
@@ -33,7 +32,7 @@ def add_refit(commands) -> None:
     add_common(parser, refit_command, leash=True)
 
 
-def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def refit_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`refit RESULT --object ID`."""
     from ..core.progress import Progress
 
@@ -51,4 +50,3 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     line = f"Fitted again in {duration(seconds)}: object {', '.join(map(str, objects))} of {arguments.result}"
     values = {"seconds": seconds, "result": str(arguments.result.absolute()), "objects": objects}
     tell_end(arguments, stream, console["listener"], report["warnings"], line, **values)
-    return EXIT_OK

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from ..core.errors import EXIT_OK, BadInputError
+from ..core.errors import BadInputError
 from .common import add_common, console_run, need, tell_end
 
 
@@ -67,7 +67,7 @@ def strength(text: str) -> tuple[float, str]:
     raise argparse.ArgumentTypeError(f"'{text}' is not a strength, such as 0.5, 20W or 800lm")
 
 
-def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def relight_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`relight RESULT --out FILE`."""
     from ..core.progress import Progress
 
@@ -98,4 +98,3 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         )
     values = {"picture": str(arguments.out.absolute())}
     tell_end(arguments, stream, console["listener"], remarks, f"Done: {arguments.out}", kind="Note", **values)
-    return EXIT_OK

@@ -117,7 +117,7 @@ def options_of(arguments: argparse.Namespace) -> list[str]:
     return given + [f"--{flag}" for flag, wanted in flags.items() if wanted]
 
 
-def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def stage_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`stage CAPTURE --out RESULT --stage NAME [--block I/N]`."""
     settings = settings_from(arguments)
     run = run_from(arguments, until=arguments.stage, alone=True, block=arguments.block)
@@ -131,7 +131,6 @@ def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     values = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
     warnings = report.get("warnings", ()) if arguments.stage == WRITE else ()
     tell_end(arguments, stream, console["listener"], warnings, line, **values)
-    return EXIT_OK
 
 
 def _rooms(arguments: argparse.Namespace) -> list[Room]:
@@ -145,11 +144,10 @@ def _rooms(arguments: argparse.Namespace) -> list[Room]:
     return rooms_from(*requested, options_of(arguments), divided)
 
 
-def plan_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+def plan_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     """`plan CAPTURE --blocks N`."""
     rooms = [room.as_dict() for room in _rooms(arguments)]
     print(json.dumps({"rooms": rooms}, indent=1, ensure_ascii=False), file=stream)
-    return EXIT_OK
 
 
 def submit_command(arguments: argparse.Namespace, stream: TextIO) -> int:

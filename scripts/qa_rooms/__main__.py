@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="qa_rooms", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="render a room")
@@ -43,8 +43,7 @@ def main(argv: list[str] | None = None) -> int:
         from .score import table
 
         sys.stdout.write(table(options.capture, options.result))
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
