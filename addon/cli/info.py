@@ -49,24 +49,19 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     sizes = ", ".join(f"{count} of {size}" for size, count in facts["resolutions"].items())
     lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
     lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
-    print(f"{facts['capture']} ({facts['format']})", file=stream)
     details = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
-    print(f"  frames     {facts['frames']}{details}", file=stream)
-    print(
-        f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
-        f"{extent} m",
-        file=stream,
-    )
-    print(f"  instances  {len(facts['instances'])}", file=stream)
-    for instance in facts["instances"]:
-        print(
-            f"    {instance['object_id']:>5}  {instance['class_name']:<24} {instance['triangles']:>8} triangles",
-            file=stream,
-        )
-    for warning in facts["warnings"]:
-        print(f"  warning    {warning}", file=stream)
-    for sentence in facts.get("agreement", {}).get("sentences", ()):
-        print(f"  poses      {sentence}", file=stream)
+    mesh = f"{facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, {extent} m"
+    lines = [
+        f"{facts['capture']} ({facts['format']})",
+        f"  frames     {facts['frames']}{details}",
+        f"  mesh       {mesh}",
+        f"  instances  {len(facts['instances'])}",
+    ]
+    for item in facts["instances"]:
+        lines.append(f"    {item['object_id']:>5}  {item['class_name']:<24} {item['triangles']:>8} triangles")
+    lines += [f"  warning    {warning}" for warning in facts["warnings"]]
+    lines += [f"  poses      {sentence}" for sentence in facts.get("agreement", {}).get("sentences", ())]
+    print("\n".join(lines), file=stream)
 
 
 def compare(capture, arguments: argparse.Namespace) -> dict:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import TextIO
 
@@ -108,11 +109,11 @@ def options_of(arguments: argparse.Namespace) -> list[str]:
         if value is not None:
             given.append(f"--{'' if value else 'no-'}{option}" if info.kind is bool else f"--{option}={value}")
     given += [f"--without={name}" for name in arguments.without or ()]
-    texts = {name: getattr(arguments, name) for name in ("format", "transfer", "convention", "white", "unwrap")}
-    paths = {name: getattr(arguments, name) for name in ("mesh", "exposures", "segments", "override")}
-    given += [f"--{name}={text}" for name, text in texts.items() if text]
-    absolute = {name: path.absolute() if isinstance(path, Path) else path for name, path in paths.items()}
-    given += [f"--{name}={path}" for name, path in absolute.items() if path]
+    texts = ("format", "transfer", "convention", "white", "unwrap")
+    paths = ("mesh", "exposures", "segments", "override")
+    for name in texts + paths:
+        if value := getattr(arguments, name):
+            given.append(f"--{name}={value.absolute() if isinstance(value, Path) else value}")
     flags = {"outside": arguments.outside, "no-scene": not arguments.scene, "no-overrides": arguments.no_overrides}
     return given + [f"--{flag}" for flag, wanted in flags.items() if wanted]
 
@@ -140,8 +141,11 @@ def _rooms(arguments: argparse.Namespace) -> list[Room]:
     with needed_packages():
         from ..core.pipeline.stages import STAGES
     divided = tuple(stage.name for stage in STAGES if stage.divided_by and stage.name not in settings.published)
-    requested = arguments.rooms, arguments.list, arguments.out, arguments.blocks, arguments.program
-    return rooms_from(*requested, options_of(arguments), divided)
+    if arguments.blocks < 1:
+        raise BadInputError(f"A stage can't be divided into {arguments.blocks} blocks; give 1 or more.")
+    program, options = tuple(shlex.split(arguments.program)) or (PROGRAM,), tuple(options_of(arguments))
+    shared = {"blocks": arguments.blocks, "program": program, "options": options, "divided": divided}
+    return rooms_from(arguments.rooms, arguments.list, arguments.out, shared)
 
 
 def plan_command(arguments: argparse.Namespace, stream: TextIO) -> None:

@@ -1,7 +1,6 @@
 """The graph of a room's units of work, which each engine is given in its own format."""
 
 import json
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -133,15 +132,7 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def rooms_from(
-    captures: list[Path],
-    list_file: Path | None,
-    results: Path,
-    blocks: int,
-    program: str,
-    options: list[str],
-    divided: tuple[str, ...],
-) -> list[Room]:
+def rooms_from(captures: list[Path], list_file: Path | None, results: Path, shared: dict[str, Any]) -> list[Room]:
     """The rooms that a command names.
 
     Parameters
@@ -150,16 +141,14 @@ def rooms_from(
         Their result folders have the same names, in `results`.
     list_file : Path, optional
         File with a capture in each line, followed by a tab and its result folder if that is not the default.
-    program : str
-        As a shell would split it.
+    shared : dict
+        The other fields of each `Room`.
 
     Raises
     ------
     BadInputError
         There is no room, two would have one result folder, or the list can't be read.
     """
-    if blocks < 1:
-        raise BadInputError(f"A stage can't be divided into {blocks} blocks; give 1 or more.")
     folders = [(capture, results / capture.absolute().name) for capture in captures]
     if list_file is not None:
         try:
@@ -174,9 +163,7 @@ def rooms_from(
             )
     if not folders:
         raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
-    command = tuple(shlex.split(program)) or (PROGRAM,)
-    shared = blocks, command, tuple(options), divided
-    rooms = [Room(capture.absolute(), result.absolute(), *shared) for capture, result in folders]
+    rooms = [Room(capture.absolute(), result.absolute(), **shared) for capture, result in folders]
     taken: dict[Path, Path] = {}
     for room in rooms:
         if room.result.resolve() == room.capture.resolve():

@@ -107,20 +107,16 @@ class SidebarPanel:
             self.layout.operator("scan_relight.manual", text="", icon="HELP", emboss=False).page = self.manual
 
 
-class NamedRows:
-    """A list whose rows are named after objects of the room."""
-
-    @staticmethod
-    def name(layout, name: str, icon: str = "NONE") -> None:
-        """Draw a name; its number has its own column, so that a narrow panel never cuts off the number."""
-        kind, number = numbered(name)
-        row = layout.row()
-        row.label(text=kind, icon=icon, translate=False)
-        if number:
-            number_row = row.row()
-            number_row.alignment = "RIGHT"
-            number_row.ui_units_x = 0.5 + 0.45 * len(number)
-            number_row.label(text=number, translate=False)
+def draw_name(layout, name: str, icon: str = "NONE") -> None:
+    """Draw an object's name in a list; its number has its own column, so that a narrow panel never cuts it off."""
+    kind, number = numbered(name)
+    row = layout.row()
+    row.label(text=kind, icon=icon, translate=False)
+    if number:
+        number_row = row.row()
+        number_row.alignment = "RIGHT"
+        number_row.ui_units_x = 0.5 + 0.45 * len(number)
+        number_row.label(text=number, translate=False)
 
 
 def places(keys: list) -> list[int]:

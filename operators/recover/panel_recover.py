@@ -108,10 +108,9 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if not scene.get(OWN_SCENE):
             return
         changes = room_changes.stored_changes(scene)
-        if changes:
-            if body := folded(layout, "changes", f"{len(changes)} objects differ from the run before"):
-                for change in changes[:CHANGES]:
-                    self.say(body, change["text"], "DOT")
+        if changes and (body := folded(layout, "changes", f"{len(changes)} objects differ from the run before")):
+            for change in changes[:CHANGES]:
+                self.say(body, change["text"], "DOT")
         if len(bpy.data.scenes) > 1:
             layout.operator_menu_enum("scan_relight.link_room", "scene", icon="LINKED")
 
@@ -128,8 +127,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             self.say(layout, jobs.STOPPED_TEXT, "INFO")
         else:
             self.say(layout, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
-        if job.warnings:
-            count = len(job.warnings)
-            if body := folded(layout, "warnings", f"{count} warning{'s' * (count > 1)}"):
-                for sentence in job.warnings:
-                    self.say(body, sentence, "ERROR")
+        count = len(job.warnings)
+        if count and (body := folded(layout, "warnings", f"{count} warning{'s' * (count > 1)}")):
+            for sentence in job.warnings:
+                self.say(body, sentence, "ERROR")

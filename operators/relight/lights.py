@@ -2,11 +2,12 @@
 
 import atexit
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import bpy
 from bl_operators.presets import AddPresetBase
+from bpy.utils import previews
 
 from ...addon.bridge.light import lamps, outside
 from ...addon.bridge.relight import exposure, lights, probe, setup
@@ -44,32 +45,28 @@ PRESETS = (
     ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"),
 )
 PICTURES = Path(__file__).resolve().parents[1] / "thumbnails"
-_pictures = None
+
+
+@cache
+def _pictures():
+    """All presets' pictures, as previews."""
+    pictures = previews.new()
+    for name, _, _ in PRESETS:
+        pictures.load(name, str(PICTURES / f"{name.lower()}.png"), "IMAGE")
+    atexit.register(forget_pictures)
+    return pictures
 
 
 def picture(name: str) -> int:
     """Icon id of a preset's picture; 0 without a window."""
-    global _pictures
-    if bpy.app.background:
-        return 0
-    if _pictures is None:
-        from bpy.utils import previews
-
-        _pictures = previews.new()
-        atexit.register(forget_pictures)
-    if name not in _pictures:
-        _pictures.load(name, str(PICTURES / f"{name.lower()}.png"), "IMAGE")
-    return _pictures[name].icon_id
+    return 0 if bpy.app.background else _pictures()[name].icon_id
 
 
 def forget_pictures() -> None:
     """Free the pictures."""
-    global _pictures
-    if _pictures is not None:
-        from bpy.utils import previews
-
-        previews.remove(_pictures)
-        _pictures = None
+    if _pictures.cache_info().currsize:
+        previews.remove(_pictures())
+        _pictures.cache_clear()
         atexit.unregister(forget_pictures)
 
 

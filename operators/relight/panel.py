@@ -8,7 +8,7 @@ from ...addon.bridge.light import outside as relight_outside
 from ...addon.bridge.relight import exposure, lights, match_frame
 from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
-from ..base.panel import NamedRows, SidebarPanel, fields, places
+from ..base.panel import SidebarPanel, draw_name, fields, places
 from .base import has_room, measure_soon
 from .lights import PRESETS, picture
 
@@ -17,7 +17,7 @@ NAME: Shown[float] = 0.6
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
 
-class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
+class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
     """The lamps by the first object of each: for materials Blender would first render previews."""
 
     lamps: dict = {}  # result of the last `filter_items`, which runs before the rows are drawn
@@ -29,7 +29,7 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
             row = column.split(factor=NAME, align=True)
             name = row.row(align=True)
             name.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
-            self.name(name, material.name)
+            draw_name(name, material.name)
             value = row.row(align=True)
             value.enabled = lamp.on
             colour = value.row(align=True)

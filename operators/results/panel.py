@@ -15,7 +15,7 @@ from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
 from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
-from ..base.panel import NamedRows, SidebarPanel, places
+from ..base.panel import SidebarPanel, draw_name, places
 from ..base.properties import enum_property, int_property
 from . import summary as results
 from .look import select
@@ -34,21 +34,18 @@ ORDERS = [
 ]
 
 
-class ResultRows(NamedRows):
-    """A list with what was found in each row."""
-
-    def row(self, layout, name: str, entry: dict) -> None:
-        """Draw a row: name, roughness, F0 and certainty."""
-        text = "  ".join(filter(None, columns(entry)))
-        split = layout.split(factor=NAME if text else 0.9)  # long names may use the empty space
-        self.name(split, name, getattr(find(entry.get("model")), "icon", "BLANK1"))
-        row = split.row()
-        if text:
-            row.label(text=text, translate=False)  # one label: the margins of two would leave no space for numbers
-        row.label(text="", icon=SIGNS[results.certainty(entry)])
+def draw_row(layout, name: str, entry: dict) -> None:
+    """Draw what was found of an object: name, roughness, F0 and certainty."""
+    text = "  ".join(filter(None, columns(entry)))
+    split = layout.split(factor=NAME if text else 0.9)  # long names may use the empty space
+    draw_name(split, name, getattr(find(entry.get("model")), "icon", "BLANK1"))
+    row = split.row()
+    if text:
+        row.label(text=text, translate=False)  # one label: the margins of two would leave no space for numbers
+    row.label(text="", icon=SIGNS[results.certainty(entry)])
 
 
-class SCAN_RELIGHT_UL_results(ResultRows, bpy.types.UIList):
+class SCAN_RELIGHT_UL_results(bpy.types.UIList):
     """The recovered objects; the rows are the scene's own objects, so none of this is saved.
 
     An object with parts is listed by the least sure of those that pass the filter.
@@ -59,7 +56,7 @@ class SCAN_RELIGHT_UL_results(ResultRows, bpy.types.UIList):
     order: enum_property("Order", "How the list is sorted", ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
-        self.row(layout, item.name, self.entries.get(item.name, {}))
+        draw_row(layout, item.name, self.entries.get(item.name, {}))
 
     def draw_filter(self, context, layout):
         layout.prop(self, "filter_name", text="", icon="VIEWZOOM")
@@ -84,12 +81,12 @@ class SCAN_RELIGHT_UL_results(ResultRows, bpy.types.UIList):
         return flags, places(keys)
 
 
-class SCAN_RELIGHT_UL_parts(ResultRows, bpy.types.UIList):
+class SCAN_RELIGHT_UL_parts(bpy.types.UIList):
     """The material slots of an object with parts, as Blender lists them; an empty row shows nothing recovered."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         entry = file.rows_of_parts([data]).get(data, {}).get(in_slot(data, index), {})
-        self.row(layout, item.material.name if item.material else "", entry)
+        draw_row(layout, item.material.name if item.material else "", entry)
 
 
 def least_sure(parts: Iterable[dict], model: str = "ALL") -> dict | None:
@@ -122,7 +119,7 @@ def _short(value: float) -> str:
 
 def active_row(scene) -> int:
     """The active object's row."""
-    obj = bpy.context.view_layer.objects.active if bpy.context.scene == scene else None
+    obj = results.active(scene)
     return scene.objects.find(obj.name) if obj is not None else -1
 
 
@@ -180,10 +177,8 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             layout.template_list(
                 "SCAN_RELIGHT_UL_parts", "", obj, "material_slots", obj, "active_material_index", rows=len(parts)
             )
-        if parts:
-            entry = parts.get(chosen_in(obj))
-            if entry is not None:
-                self.details(layout.box(), context, name_of(obj), entry)
+        if parts and (entry := parts.get(chosen_in(obj))) is not None:
+            self.details(layout.box(), context, name_of(obj), entry)
         layout.operator("scan_relight.open_report", icon="URL")
 
     def bring_in(self, layout, scene, folder: Path | None) -> None:
