@@ -77,11 +77,8 @@ def _piano(r: FurnishedRoom, x: float) -> None:
 def _desk(r: FurnishedRoom, seed: int, y: float) -> None:
     """A desk with a leather pad, a steel lamp, a cup, papers; before it a chair."""
     top = r.gloss(0.3, wood((0.3, 0.13, 0.06), 3, seed))
-    r.add(
-        "desk",
-        [box((3.0, y - 0.9, 0.72), (4.6, y - 0.15, 0.76)), *legs(3.02, y - 0.88, 4.58, y - 0.17, 0.72, 0.06)],
-        top,
-    )
+    desk = [box((3.0, y - 0.9, 0.72), (4.6, y - 0.15, 0.76)), *legs(3.02, y - 0.88, 4.58, y - 0.17, 0.72, 0.06)]
+    r.add("desk", desk, top)
     r.add("desk pad", [box((3.5, y - 0.85, 0.7605), (4.1, y - 0.45, 0.765))], r.gloss(0.5, (0.03, 0.09, 0.05)))
     r.add("paper", [box((3.65, y - 0.75, 0.7655), (3.86, y - 0.5, 0.768))], r.diffuse(0.82, 0.82, 0.8))
     arm = [(4.35, y - 0.3, 0.775), (4.35, y - 0.3, 1.1), (4.2, y - 0.45, 1.2)]
@@ -89,19 +86,13 @@ def _desk(r: FurnishedRoom, seed: int, y: float) -> None:
     r.add_round("desk lamp", [tube(arm, 0.012, 10), foot], r.metal(0.35, STEEL))
     r.add("lamp shade", [cone((4.18, y - 0.47, 1.1), 0.11, 0.04, 0.13, 28)], r.gloss(0.3, (0.02, 0.14, 0.06)))
     r.add("bulb", [ball((4.18, y - 0.47, 1.14), 0.03, 5)], r.lamp(110, 80, 50))
-    r.add_round(
-        "cup",
-        [turned((3.3, y - 0.6, 0.761), [(0.035, 0), (0.04, 0.09), (0.037, 0.09), (0.033, 0.01), (0.002, 0.01)], 24)],
-        r.gloss(0.12, (0.75, 0.3, 0.05)),
-    )
-    r.add_round(
-        "chair",
-        [
-            cushion((3.8, y - 1.25, 0.46), (0.23, 0.22, 0.035), 8, 0.4),
-            cushion((3.8, y - 1.47, 0.8), (0.22, 0.03, 0.24), 8, 0.4),
-        ],
-        r.diffuse(0.4, 0.12, 0.05),
-    )
+    cup = [(0.035, 0), (0.04, 0.09), (0.037, 0.09), (0.033, 0.01), (0.002, 0.01)]
+    r.add_round("cup", [turned((3.3, y - 0.6, 0.761), cup, 24)], r.gloss(0.12, (0.75, 0.3, 0.05)))
+    chair = [
+        cushion((3.8, y - 1.25, 0.46), (0.23, 0.22, 0.035), 8, 0.4),
+        cushion((3.8, y - 1.47, 0.8), (0.22, 0.03, 0.24), 8, 0.4),
+    ]
+    r.add_round("chair", chair, r.diffuse(0.4, 0.12, 0.05))
     r.add("chair legs", legs(3.58, y - 1.46, 4.02, y - 1.04, 0.43, 0.035), r.gloss(0.35, (0.12, 0.06, 0.03)))
 
 
@@ -158,11 +149,8 @@ def _small_things(r: FurnishedRoom, x: float, y: float, seed: int) -> None:
         "plant", [tube([(4.6, 0.5, 0.3), (4.6, 0.5, 1.25)], 0.014, 8), *leaves], r.gloss(0.45, (0.08, 0.2, 0.05))
     )
     r.add_round("globe", [ball((2.75, y - 0.35, 1.0), 0.16, 12)], r.gloss(0.25, (0.1, 0.22, 0.4)))
-    r.add_round(
-        "globe stand",
-        [turned((2.75, y - 0.35, 0.002), [(0.16, 0), (0.03, 0.05), (0.025, 0.82), (0.06, 0.845)], 24)],
-        r.gloss(0.3, wood((0.25, 0.12, 0.05), 1, seed)),
-    )
+    stand = [turned((2.75, y - 0.35, 0.002), [(0.16, 0), (0.03, 0.05), (0.025, 0.82), (0.06, 0.845)], 24)]
+    r.add_round("globe stand", stand, r.gloss(0.3, wood((0.25, 0.12, 0.05), 1, seed)))
     r.add("door", [box((x - 0.04, 3.2, 0.0), (x - 0.002, 4.1, 2.1))], r.gloss(0.35, (0.7, 0.68, 0.6)))
     r.add_round("door handle", [tube([(x - 0.09, 3.28, 1.02), (x - 0.09, 3.41, 1.02)], 0.012, 8)], r.metal(0.25, BRASS))
     fins = [box((0.85 + 0.06 * k, 0.03, 0.15), (0.89 + 0.06 * k, 0.13, 0.75)) for k in range(15)]
