@@ -37,15 +37,10 @@ def add_ablation(commands) -> None:
     parser.add_argument("--seeds", metavar="INT", type=int, nargs="+", default=(0, 1), help="default 0 1")
     parser.add_argument("--preset", choices=tuple(PRESETS), default="normal", help="of the settings (default normal)")
     parser.add_argument("--threads", type=int, metavar="INT", default=1, help="0 takes all cores (default 1)")
-    parser.add_argument(
-        "--limit-minutes", type=float, metavar="FLOAT", default=0.0, help="begin no further run after (default 0, none)"
-    )
-    parser.add_argument(
-        "--table",
-        metavar="FILE",
-        type=Path,
-        help="run nothing, and write the table of all OUT/ablation*.jsonl as Markdown, with a plot beside it",
-    )
+    limit = "begin no further run after (default 0, none)"
+    parser.add_argument("--limit-minutes", type=float, metavar="FLOAT", default=0.0, help=limit)
+    table = "run nothing, and write the table of all OUT/ablation*.jsonl as Markdown, with a plot beside it"
+    parser.add_argument("--table", metavar="FILE", type=Path, help=table)
     add_common(parser, ablation_command)
 
 
@@ -82,8 +77,9 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> None:
         arguments.threads,
         60 * arguments.limit_minutes,
     )
-    path = run_ablation(
-        ablation, (lambda text: None) if arguments.quiet else lambda text: print(text, file=stream, flush=True)
-    )
-    if not arguments.quiet:
-        print(f"Runs: {path}", file=stream)
+
+    def tell(text: str) -> None:
+        if not arguments.quiet:
+            print(text, file=stream, flush=True)
+
+    tell(f"Runs: {run_ablation(ablation, tell)}")

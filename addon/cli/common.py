@@ -21,12 +21,8 @@ from ..settings_info import setting_infos
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """Add the options on how to read a capture whose folder does not say: one for each field of `Reading`."""
     add = parser.add_argument_group("the capture").add_argument
-    add(
-        "--format",
-        metavar="NAME",
-        default="",
-        help="its layout, such as nerfstudio (default: found from what it holds)",
-    )
+    layout = "its layout, such as nerfstudio (default: found from what it holds)"
+    add("--format", metavar="NAME", default="", help=layout)
     add("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
     add("--outside", action="store_true", help="let its files name others outside of its folder")
     curves = "curve of 8 and 16-bit pictures: srgb, linear, a gamma such as 2.2; auto calibrates them (default)"

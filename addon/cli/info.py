@@ -21,9 +21,8 @@ def add_info(commands) -> None:
     parser.add_argument("--room", metavar="FOLDER", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--no-look", action="store_true", help="don't compare the frames with the mesh")
-    parser.add_argument(
-        "--overlay", metavar="PNG", type=Path, help="write frames with the mesh's edges drawn over them"
-    )
+    edges = "write frames with the mesh's edges drawn over them"
+    parser.add_argument("--overlay", metavar="PNG", type=Path, help=edges)
     add_reading(parser)
     add_common(parser, info_command, quiet=False)
 

@@ -3,7 +3,7 @@
 import html
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,7 @@ def room_state(result: Path) -> RoomState:
     units = [_unit(result, name, stage) for name, stage in task_names]
     # What was joined needs its blocks no more.
     joined = {unit.stage for unit in units if unit.name == unit.stage and unit.state == DONE}
-    units = [UnitState(**(vars(unit) | {"state": DONE})) if unit.stage in joined else unit for unit in units]
+    units = [replace(unit, state=DONE) if unit.stage in joined else unit for unit in units]
     cost = [COST.get(unit.stage, 1) / sum(sibling.stage == unit.stage for sibling in units) for unit in units]
     share = sum(c for c, unit in zip(cost, units, strict=True) if unit.state == DONE) / sum(cost)
     unfinished = [unit for unit in units if unit.state != DONE]

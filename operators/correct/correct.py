@@ -192,7 +192,6 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
         "Value",
         "What is taken back",
         [("all", "All", "Everything"), *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items())],
-        default="all",
     )
 
     @classmethod

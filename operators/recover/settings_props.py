@@ -40,36 +40,27 @@ TARGETS = [
         "The objects that were selected when the scene was captured; what they wear now is kept and can be restored",
     ),
 ]
-IMAGES = enum_property(
-    "Images",
-    "Where the recovered images are kept",
-    [
-        ("RESULT", "In the Result Folder", "Refer to the images where they are"),
-        ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
-        ("PACK", "Packed", "Keep the images within the .blend"),
-    ],
-)
-INTO = enum_property(
-    "Into",
-    "Where the room goes",
-    [
-        ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
-        ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay"),
-    ],
-)
+IMAGE_PLACES = [
+    ("RESULT", "In the Result Folder", "Refer to the images where they are"),
+    ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
+    ("PACK", "Packed", "Keep the images within the .blend"),
+]
+SCENES = [
+    ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
+    ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay"),
+]
+AGAIN_FROM = [
+    ("NONE", "Nothing", "Go on from what is stored"),
+    *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
+]
+IMAGES = enum_property("Images", "Where the recovered images are kept", IMAGE_PLACES)
+INTO = enum_property("Into", "Where the room goes", SCENES)
 COPIES = bool_property(
     "Make Copies",
     "Where modifiers or instances make an object's faces, put the material onto a "
     "copy of it and hide the object; without this such objects are left as they are",
 )
-FROM_STAGE = enum_property(
-    "Again From",
-    "Do this stage and all later ones anew, though they are stored",
-    [
-        ("NONE", "Nothing", "Go on from what is stored"),
-        *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
-    ],
-)
+FROM_STAGE = enum_property("Again From", "Do this stage and all later ones anew, though they are stored", AGAIN_FROM)
 SAVED_AS = {"median": (2, 3, 4)}
 """Numbers of choices in saved files, where some were removed: 0 was 'adaptive', 1 'batched'."""
 PACKAGES = ("scipy", "embreex", "OpenEXR")

@@ -140,10 +140,7 @@ class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
     bl_label = "Run Recovery"
 
     target: enum_property(
-        "Operator",
-        "What is run",
-        [(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()],
-        default="recover",
+        "Operator", "What is run", [(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()]
     )
     from_stage: FROM_STAGE
 
@@ -183,6 +180,19 @@ class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
 
 
 FOLDER = "scene_capture"
+CAMERAS = [
+    (
+        "AUTO",
+        "Automatic",
+        "An animation where the only camera has a sequence or a clip behind it, else one frame for each camera",
+    ),
+    (
+        "OBJECTS",
+        "Each Camera",
+        "One frame for each camera that has a picture behind it; only the selected cameras where some are selected",
+    ),
+    ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation"),
+]
 
 
 @needs(
@@ -201,24 +211,7 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
         "The capture goes into a folder within this one; empty takes the panel's, or a folder of its own "
         "among the results",
     )
-    cameras: enum_property(
-        "Frames",
-        "Which cameras took the pictures",
-        [
-            (
-                "AUTO",
-                "Automatic",
-                "An animation where the only camera has a sequence or a clip behind it, else one frame for each camera",
-            ),
-            (
-                "OBJECTS",
-                "Each Camera",
-                "One frame for each camera that has a picture behind it; only the selected "
-                "cameras where some are selected",
-            ),
-            ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation"),
-        ],
-    )
+    cameras: enum_property("Frames", "Which cameras took the pictures", CAMERAS)
     whole_range: bool_property("Whole Range", "Take the scene's frame range", default=True)
     frame_start: int_property("Start", "First frame of the animation", default=1)
     frame_end: int_property("End", "Last frame of the animation", default=250)

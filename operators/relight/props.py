@@ -34,10 +34,15 @@ AIMS = (
     ("OBJECT", "Object", "The active object"),
 )
 PLACES = AIMS[:2]
+SHAPES = (("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey"))
 LOOKS = (
     ("MATTE", "Matte", "Grey, like chalk"),
     ("GLOSSY", "Glossy", "Red lacquer"),
     ("MIRROR", "Mirror", "Polished metal, to see the room's light in"),
+)
+ENGINES = (
+    ("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
+    ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"),
 )
 
 
@@ -46,21 +51,10 @@ _TEMPERATURE = {"subtype": "TEMPERATURE", "max": HIGHEST, "step": 10000, "precis
 _LUMENS = {"min": 0.0, "soft_max": 100000.0, "step": 1000, "precision": 0}
 
 # Shared by the panel's choices and the operators that take them.
-SHAPE = enum_property(
-    "Shape",
-    "What is set into the room",
-    (("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey")),
-)
+SHAPE = enum_property("Shape", "What is set into the room", SHAPES)
 LOOK = enum_property("Material", "Of the new object", LOOKS, default="MIRROR", translation_context=OWN)
 SIZE = float_property("Size", "Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
-ENGINE = enum_property(
-    "Engine",
-    "Renders the two pictures",
-    (
-        ("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
-        ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"),
-    ),
-)
+ENGINE = enum_property("Engine", "Renders the two pictures", ENGINES)
 AIM = enum_property("Aim At", "What a new light is aimed at", AIMS)
 UNIT = enum_property("Strength In", "What a new light's strength is given in", UNITS)
 KELVIN = float_property(
