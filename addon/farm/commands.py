@@ -125,9 +125,9 @@ def stage_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     with needed_packages():
         from ..core.pipeline.run import progress_of_run
         from .unit import unit
-    with console_run(arguments, stream) as console:
-        with unit(arguments.out, arguments.stage, arguments.block, console["should_stop"]):
-            report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
+    done = arguments.out, arguments.stage, arguments.block
+    with console_run(arguments, stream) as console, unit(*done, console["should_stop"]):
+        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
     line = f"Done in {duration(report['seconds'])}: stage '{arguments.stage}' of {arguments.out}"
     values = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
     warnings = report.get("warnings", ()) if arguments.stage == WRITE else ()

@@ -35,13 +35,13 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         others = len([other for other in objects if other != obj])
         name = name_of(obj)
         layout.label(text=f"{name} and {others} more" if others else name, icon="OBJECT_DATA", translate=False)
-        self.statements(layout, context, choices, obj)
+        self.statements(layout, choices, obj)
         self.values(layout, obj)
         if others:
             layout.prop(choices, "all_selected")
-        self.refit(layout, context, choices, obj)
+        self.refit(layout, choices, obj)
 
-    def statements(self, layout, context, choices, obj) -> None:
+    def statements(self, layout, choices, obj) -> None:
         column = layout.column(align=True)
         column.label(text="This is:")
         given = corrections.given(obj)
@@ -86,7 +86,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
             key = "base_color" if pinned and key not in given else key
             reset.operator("scan_relight.take_back", text="", icon="LOOP_BACK" if pinned else "BLANK1").key = key
 
-    def refit(self, layout, context, choices, obj) -> None:
+    def refit(self, layout, choices, obj) -> None:
         job = active()
         if job is not None and "before" in job.facts:
             share, text = bar(job)

@@ -31,7 +31,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             fields(body, choices.reading, *reading_props.visible_names(choices.reading))
         wrong = findings.wrong_folder(choices)
         if wrong is not None:
-            self.wrong(layout, context, wrong)
+            self.wrong(layout, wrong)
             return
         finding = findings.look(choices) if choices.capture_folder else None
         row = layout.row()
@@ -43,9 +43,9 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         elif isinstance(finding, str):
             self.say(layout, finding, "CANCEL")
         elif finding is not None:
-            self.facts(layout, context, finding)
+            self.facts(layout, finding)
 
-    def wrong(self, layout, context, content) -> None:
+    def wrong(self, layout, content) -> None:
         """Why the folder is no capture, and a button for each folder that may be meant."""
         column = layout.column()
         self.say(column, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
@@ -57,7 +57,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             text = "Open It" if folder == content.folder else f"Open Result '{folder.name}'"
             column.operator("scan_relight.open_result", text=text, icon="IMPORT").folder = str(folder)
 
-    def facts(self, layout, context, facts: dict) -> None:
+    def facts(self, layout, facts: dict) -> None:
         """The facts of `describe` on a capture; unknown keys are shown as they are."""
         warnings = facts.get("warnings", ())
         if not warnings:
@@ -75,7 +75,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         )
         for name, value in facts.items():
             if name not in KNOWN_FACTS:
-                self.other(layout, context, name, value)
+                self.other(layout, name, value)
         instances = facts.get("instances", ())
         if body := folded(layout, "objects", f"{len(instances)} objects"):
             column = body.column(align=True)
@@ -87,7 +87,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             if len(instances) > MAX_LISTED:
                 column.label(text=f"and {len(instances) - MAX_LISTED} more")
 
-    def other(self, layout, context, name: str, value) -> None:
+    def other(self, layout, name: str, value) -> None:
         """A fact added by a reader."""
         label = name.replace("_", " ").capitalize()
         if isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in value):

@@ -50,7 +50,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         self.choices(choices, context)
         if job is None:
             self.start(context)
-            self.outcome(context)
+            self.outcome()
             self.room(context)
         else:
             self.progress(job)
@@ -114,7 +114,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if len(bpy.data.scenes) > 1:
             layout.operator_menu_enum("scan_relight.link_room", "scene", icon="LINKED")
 
-    def outcome(self, context) -> None:
+    def outcome(self) -> None:
         """How the last run of this session ended."""
         job = jobs.current()
         if job is None or job.running:

@@ -164,7 +164,7 @@ class StageOperator(SettingsProps, CaptureOperator):
     from_stage: FROM_STAGE
 
     def work(self, context) -> list[str]:
-        return self.run(context, self.until)["warnings"]
+        return self.run()["warnings"]
 
     def draw(self, context):
         """The dialog with the main choices; all others come from the preset or the caller."""
@@ -178,12 +178,13 @@ class StageOperator(SettingsProps, CaptureOperator):
             values["threads"] = getattr(preferences.preferences(), "threads", 0)
         return replace(PRESETS[self.preset], **values)
 
-    def run(self, context, until: str, **options) -> dict:
-        """Run the stages up to `until` here; returns the report. `options` goes to `bridge.job.run.run`."""
+    def run(self, **options) -> dict:
+        """Run the stages up to the last one here; returns the report. `options` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
         from ...addon.core.pipeline.run import Request, progress_of_run  # not earlier: Blender's start should not wait
 
-        settings, request = self.settings(), Request(until, self.first_stage(), reading=reading_props.reading(self))
+        settings = self.settings()
+        request = Request(self.until, self.first_stage(), reading=reading_props.reading(self))
         folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
             return run(*folders, settings, progress_of_run(should_stop=guard), request, **options)
@@ -230,7 +231,7 @@ class SceneStageOperator(StageOperator):
         from ...addon.core.results.store import Store
 
         self.check_target()
-        report, folder = self.run(context, self.until, fresh=False), self.folder("result_folder")
+        report, folder = self.run(fresh=False), self.folder("result_folder")
         report["warnings"] += whole(self.change(context.scene, read_room(folder)))
         with Store(folder) as store:
             store.write_json("report.json", report)

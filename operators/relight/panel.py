@@ -82,12 +82,12 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             row.operator("scan_relight.switch_lamps", text="All Off", icon="LIGHT").on = False
             chosen = scene.objects[studio.lamp].name if 0 <= studio.lamp < len(scene.objects) else ""
             for lamp in lamps.get(chosen, ()):
-                self.numbers(layout, context, lamp)
+                self.numbers(layout, lamp)
         else:
             self.say(layout, "The scan has no lamp.", "INFO")
         layout.operator("scan_relight.restore_light", icon="LOOP_BACK")
 
-    def numbers(self, layout, context, lamp) -> None:
+    def numbers(self, layout, lamp) -> None:
         """What a lamp emits now, and as recovered."""
         column = fields(layout.column())
         column.prop(lamp.scan_relight_lamp, "factor")

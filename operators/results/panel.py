@@ -178,7 +178,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                 "SCAN_RELIGHT_UL_parts", "", obj, "material_slots", obj, "active_material_index", rows=len(parts)
             )
         if parts and (entry := parts.get(chosen_in(obj))) is not None:
-            self.details(layout.box(), context, name_of(obj), entry)
+            self.details(layout.box(), name_of(obj), entry)
         layout.operator("scan_relight.open_report", icon="URL")
 
     def bring_in(self, layout, scene, folder: Path | None) -> None:
@@ -189,7 +189,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
         elif folder is not None:
             layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
 
-    def details(self, layout, context, name: str, entry: dict) -> None:
+    def details(self, layout, name: str, entry: dict) -> None:
         column = layout.column(align=True)
         column.label(text=name, icon=getattr(find(entry.get("model")), "icon", "BLANK1"), translate=False)
         for label, text in results.facts(entry):
