@@ -8,7 +8,6 @@ through it (`over_mirrors`). On the living room that took the albedo from 28.0 t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -37,12 +36,6 @@ class Mirror:
     point: np.ndarray
     normal: np.ndarray
     f0: np.ndarray
-
-    @staticmethod
-    def from_lists(entry: dict[str, Any]) -> Mirror:
-        """From its fields as JSON has them."""
-        point, normal, f0 = (np.asarray(entry[name], np.float32) for name in ("point", "normal", "f0"))
-        return Mirror(entry["object_id"], point, normal, f0)
 
 
 def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:

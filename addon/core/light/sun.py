@@ -8,7 +8,6 @@ its part of E comes from shadow rays at every place (`sunlight`), and it goes ba
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -59,13 +58,6 @@ class Sun:
             f"A sun that no frame sees was solved from the patch of light that it throws: {self.where()} "
             f"(differences of log albedo between light and shade {before:.3f} to {after:.3f})."
         )
-
-    @staticmethod
-    def from_lists(entry: dict[str, Any]) -> Sun:
-        """From its fields as JSON has them."""
-        direction, irradiance = (np.asarray(entry[name], np.float32) for name in ("direction", "irradiance"))
-        edges = entry["edges"] and tuple(entry["edges"])
-        return Sun(direction, irradiance, entry["radius"], entry["seen"], edges)
 
     def where(self) -> str:
         """Its place and strength in words."""

@@ -29,6 +29,7 @@ from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..progress import Progress
 from ..results.overrides import Given
+from ..results.values import kinds_of
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
@@ -112,7 +113,7 @@ class Looked:
     target: int
 
 
-LOOKED = {cls.__name__: cls for cls in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour)}
+LOOKED = kinds_of(Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour)
 """What a stored `Looked` may hold."""
 
 

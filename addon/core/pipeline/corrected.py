@@ -122,7 +122,7 @@ class Corrected(Stages):
             frames=self.frames,
             surface=self.surface(),
             lit_diffuse=self.lit_diffuse(),
-            samples=self.samples(),
+            samples=self.observed().samples,
             shading=self.shading(),
             field=self.field,
             specular=self.specular().specular,

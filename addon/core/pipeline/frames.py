@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.radiometric_calibration.calibrate import Calibration, calibrate
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
+from ..results.values import kinds_of
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
@@ -72,21 +73,9 @@ class Observed:
         """The capture's frames where they were found to be, calibrated."""
         return self.calibration.of(self.poses.of(frames))
 
-    def arrays(self) -> dict[str, np.ndarray]:
-        """What is stored of it."""
-        parts = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {
-            f"{name}.{field.name}": getattr(part, field.name) for name, part in parts.items() for field in fields(part)
-        }
 
-    @staticmethod
-    def from_arrays(arrays: dict[str, np.ndarray]) -> Observed:
-        """The inverse of `arrays`."""
-        kinds = (LitDiffuse, Environment, Samples, Poses, Calibration)
-        return Observed(*(
-            kind(**{field.name: arrays[f"{part.name}.{field.name}"] for field in fields(kind)})
-            for part, kind in zip(fields(Observed), kinds, strict=True)
-        ))  # fmt: skip
+OBSERVED = kinds_of(Observed, LitDiffuse, Environment, Samples, Poses, Calibration)
+"""What a stored `Observed` holds."""
 
 
 class FrameReader:

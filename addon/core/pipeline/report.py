@@ -107,7 +107,7 @@ def _report_lit_diffuse(run: Corrected, figures: dict[str, Any], warnings: list[
             "calibration_spread": float(calibration.spread),
             "mean_white_balance": np.exp(np.log(calibration.gain[calibration.calibrated]).mean(0)).tolist(),
         }
-    poses = run.poses()
+    poses = run.observed().poses
     if np.isfinite(poses.shift):
         figures |= {"pose_shift_pixels": float(poses.shift), "poses_refined": int(poses.moved.sum())}
     if poses.moved.any():
@@ -131,7 +131,7 @@ def _report_lit_diffuse(run: Corrected, figures: dict[str, Any], warnings: list[
     if clipped > 0:
         figures["clipped_share"] = clipped
         warnings.append(f"{clipped:.1%} of the surface is clipped in every frame that sees it; no albedo is had of it.")
-    if not run.environment().seen:
+    if not run.observed().environment.seen:
         figures["outside"] = "no frame sees past the mesh"
 
 
@@ -171,7 +171,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         warnings.append(
             f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."
         )
-    if escaped > 0.02 and not run.environment().seen and not shading.environment.radiance.any():
+    if escaped > 0.02 and not run.observed().environment.seen and not shading.environment.radiance.any():
         warnings.append(
             f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
         )

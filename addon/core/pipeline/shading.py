@@ -1,13 +1,12 @@
 """The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..json_values import plain
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.lamps import Lamp, lamp_kinds
@@ -23,6 +22,7 @@ from ..passes.material_parts.material_parts import seen_pieces, unlike_pieces
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..progress import Progress
+from ..results.values import kinds_of
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
 from ..scene.lit_diffuse import LitDiffuse
@@ -47,6 +47,8 @@ STAGE = Stage(
     (SURFACE, FRAMES),
     ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors", "seed"),
 )
+SHADING = kinds_of(Shading, Lamp, Environment, Mirror, Sun, Openings, Patches)
+"""What a stored `Shading` may hold."""
 
 
 def find_shading(
@@ -222,44 +224,3 @@ def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
     """Radians by which `noise` metres in the vertices may have turned each element, (n,) float."""
     single, sheet = fronts(mesh)
     return tilt(single, noise)[sheet[atlas.triangle]]
-
-
-def to_store(shading: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """What is stored of a `Shading`: arrays, and what JSON holds."""
-    arrays = {name: getattr(shading, name) for name in ("irradiance", "escaped", "relative_error", "radiance")}
-    arrays |= {"sky": shading.environment.radiance, "sky_seen": shading.environment.observations}
-    if shading.openings is not None:
-        arrays |= {f"openings_{field.name}": getattr(shading.openings, field.name) for field in fields(Openings)}
-    arrays |= {f"patches_{field.name}": getattr(shading.patches, field.name) for field in fields(Patches)}
-    meta = {
-        "sun": plain(shading.sun),
-        "points": shading.points,
-        "mirrors": plain(shading.mirrors),
-        "notes": list(shading.notes),
-        "lamps": [asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in shading.lamps],
-    }
-    return arrays, meta
-
-
-def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
-    """The inverse of `to_store`."""
-    lamps = tuple(
-        Lamp(
-            **(
-                entry
-                | {"radiance": np.float32(entry["radiance"]), "spread": entry["spread"] and tuple(entry["spread"])}
-            )
-        )
-        for entry in meta["lamps"]
-    )
-    mirrors = tuple(Mirror.from_lists(entry) for entry in meta["mirrors"])
-    return Shading(
-        arrays["irradiance"], arrays["escaped"], arrays["relative_error"], arrays["radiance"], lamps,
-        Environment(arrays["sky"], arrays["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
-        meta["sun"] and Sun.from_lists(meta["sun"]),
-        Openings(
-            arrays["openings_low"], arrays["openings_size"], arrays["openings_radiance"],
-            float(arrays["openings_share"]), arrays["openings_windows"],
-        ) if "openings_low" in arrays else None,
-        Patches(*(arrays[f"patches_{field.name}"] for field in fields(Patches))),
-    )  # fmt: skip

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
-from ..json_values import plain
 from ..light.field import LightField
 from ..light.over_surface import sun_irradiance
 from ..light.sun import Sun
@@ -29,6 +28,7 @@ from ..passes.sun.sun_strength import strength_without_gloss
 from ..passes.unlit_lamps.unlit import unlit
 from ..progress import Rounds
 from ..results.overrides import NOTHING, Given, Overrides
+from ..results.values import kinds_of, packed, unpacked
 from ..scene.element_groups import ElementGroups
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance, Pixels, class_names
@@ -77,18 +77,18 @@ class Specular:
 
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
-        meta: dict[str, Any] = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
-        meta["sun"] = plain(self.sun)
-        return {
+        arrays = {
             "specular": self.specular, "excess": self.excess,
             "rest_spread": self.rest.interquartile_range, "rest_count": self.rest.count, "rest_tier": self.rest.tier,
-        }, meta  # fmt: skip
+        }  # fmt: skip
+        materials, sun = [m.as_dict() for m in self.materials], packed(self.sun, arrays)
+        return arrays, {"materials": materials, "overrides": overrides.as_dict(), "sun": sun}
 
     @staticmethod
     def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], lit_diffuse: LitDiffuse) -> Specular:
         """From the stage's arrays, the descriptions as JSON has them, and L_d with its specular part."""
         materials = tuple(from_json(entry) for entry in meta["materials"])
-        sun = meta["sun"] and Sun.from_lists(meta["sun"])
+        sun = unpacked(meta["sun"], arrays, kinds_of(Sun))
         specular = arrays["specular"]
         rest = replace(
             lit_diffuse, radiance=lit_diffuse.radiance - specular, interquartile_range=arrays["rest_spread"],

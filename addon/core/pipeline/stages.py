@@ -14,7 +14,6 @@ from ..io import readers
 from ..io.fingerprint import fingerprint
 from ..json_values import key
 from ..kinds import Block
-from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.mirrors import in_their_planes
 from ..light.shading import Shading
@@ -25,12 +24,11 @@ from ..progress import Progress
 from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
-from ..results.values import packed, unpacked
+from ..results.values import from_store, to_store
 from ..scene.closed_mesh import without_closing
 from ..scene.frame_choice import with_frames_that_add
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
-from ..scene.samples import Samples
 from ..scene.surface import Surface
 from ..scene.two_sides import laid_apart
 from ..scene.unwrap import Unwrap
@@ -159,8 +157,8 @@ class Stages:
         self,
         stage: Stage,
         compute: Callable[[Settings], T],
-        to_store: Callable[[T], Stored],
-        from_store: Callable[[Arrays, dict[str, Any]], T],
+        stored_as: Callable[[T], Stored],
+        restored: Callable[[Arrays, dict[str, Any]], T],
     ) -> T:
         """The value of a stage: kept, stored, or computed now and stored."""
         name = stage.name
@@ -170,11 +168,11 @@ class Stages:
         stored = self.store.load(name, self.keys[name])
         self.progress.stage(name)
         if stored is not None:
-            value = from_store(stored, self.store.load_meta(name, self.keys[name]) or {})
+            value = restored(stored, self.store.load_meta(name, self.keys[name]) or {})
         else:
             value = compute(stage.settings(self.settings))
             value = followed(name, value, self.done, self.settings.without)
-            self.store.save(name, self.keys[name], *to_store(value))
+            self.store.save(name, self.keys[name], *stored_as(value))
         give_back()
         self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": stored is not None}
         self.log[name]["peak_memory_bytes"] = peak_memory()
@@ -226,10 +224,11 @@ class Stages:
 
     def room_poses(self) -> Poses:
         """Where the frames were found to be, in the capture's coordinates."""
-        poses = self.poses().camera_to_world.copy()
-        for pose, original, centred in zip(poses, self.capture.frames, self._centred.frames, strict=True):
+        poses = self.observed().poses
+        moved = poses.camera_to_world.copy()
+        for pose, original, centred in zip(moved, self.capture.frames, self._centred.frames, strict=True):
             pose[:3, 3] += original.camera.centre - centred.camera.centre
-        return replace(self.poses(), camera_to_world=poses)
+        return replace(poses, camera_to_world=moved)
 
     def observed(self) -> Observed:
         """What the frames show."""
@@ -243,32 +242,17 @@ class Stages:
             passes = frames.Passes(room, self.read, settings, self.store.folder)
             return frames.observe(passes, self._centred, self.progress)
 
-        def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
-            self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))
-            return Observed.from_arrays(arrays)
+        def restored(arrays: Arrays, meta: dict[str, Any]) -> Observed:
+            observed, self.read.bad, self.read.blind = from_store(arrays, meta, frames.OBSERVED)
+            return observed
 
         return self._stage(
-            frames.STAGE,
-            observe,
-            lambda observed: (observed.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
-            from_store,
+            frames.STAGE, observe, lambda observed: to_store((observed, self.read.bad, self.read.blind)), restored
         )
 
     def lit_diffuse(self) -> LitDiffuse:
         """L_d of every element."""
         return self.observed().lit_diffuse
-
-    def environment(self) -> Environment:
-        """Light from outside, as the frames saw it."""
-        return self.observed().environment
-
-    def samples(self) -> Samples:
-        """Observations kept one by one for the specular fit."""
-        return self.observed().samples
-
-    def poses(self) -> Poses:
-        """Where the frames were found to be."""
-        return self.observed().poses
 
     def shading(self) -> Shading:
         """Lamps and irradiance."""
@@ -276,8 +260,8 @@ class Stages:
         result = self._stage(
             shading.STAGE,
             lambda settings: shading.find_shading(self._centred, room, observed, settings, self.progress),
-            shading.to_store,
-            shading.from_store,
+            to_store,
+            lambda arrays, meta: from_store(arrays, meta, shading.SHADING),
         )
         if first and len(result.patches):
             self.done[surface.STAGE.name] = result.patches.surface(room)
@@ -287,7 +271,7 @@ class Stages:
     @cached_property
     def field(self) -> LightField:
         """The room as a light source, with all that was found of its light."""
-        light = self.shading()
+        light = self.shading()  # first, as it sets lamps apart from the surface
         return shading.lit_room(self.surface(), light)
 
     def specular(self) -> Specular:
@@ -311,8 +295,7 @@ class Stages:
             return
         self.progress.stage(specular.STAGE.name)
         looked = look_at_block(self._room(settings), block)
-        arrays: Arrays = {}
-        self.store.save(name, key, arrays, {"looked": packed(looked, arrays)})
+        self.store.save(name, key, *to_store(looked))
         self.progress.done()
 
     def _stored_looks(self) -> dict[int, Looked]:
@@ -321,13 +304,13 @@ class Stages:
         for name in self.store.parts(specular.STAGE.name):
             arrays = self.store.load(name, self.keys[specular.STAGE.name])
             if arrays is not None:
-                looked |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
+                looked |= from_store(arrays, self.store.stored_meta(name), LOOKED)
         return looked
 
     def _room(self, settings: Settings) -> Room:
         light, names = self.shading(), [frame.name for frame in self.capture.frames]
         return Room(
-            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, self.samples(), names,
+            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, self.observed().samples, names,
             light.lamps, self.surface().noise, self.overrides.lobes(), settings, self.progress,
         )  # fmt: skip
 

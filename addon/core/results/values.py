@@ -1,6 +1,7 @@
 """Frozen values as arrays and JSON, and back as they were: the same types, the same bits.
 
-For what one worker hands to another. Nothing of it is code: only classes that the reader names are made.
+For what stages store, and what one worker hands to another. Nothing of it is code: only classes that the reader names
+are made.
 """
 
 from collections.abc import Mapping
@@ -13,6 +14,24 @@ from ..brdf.model import Brdf
 from ..brdf.registry import find
 
 Arrays = dict[str, np.ndarray]
+Kinds = Mapping[str, type]
+"""Frozen values by their names."""
+
+
+def kinds_of(*classes: type) -> Kinds:
+    """Classes by their names."""
+    return {cls.__name__: cls for cls in classes}
+
+
+def to_store(value: Any) -> tuple[Arrays, dict[str, Any]]:
+    """What is stored of a value: arrays, and what JSON holds. Raises as `packed`."""
+    arrays: Arrays = {}
+    return arrays, {"value": packed(value, arrays)}
+
+
+def from_store(arrays: Arrays, meta: dict[str, Any], kinds: Kinds) -> Any:
+    """The inverse of `to_store`; parameters and errors as of `unpacked`."""
+    return unpacked(meta["value"], arrays, kinds)
 
 
 def packed(value: Any, arrays: Arrays) -> Any:
@@ -41,8 +60,8 @@ def packed(value: Any, arrays: Arrays) -> Any:
     raise TypeError(f"{type(value).__name__} is no value that can be stored")
 
 
-def unpacked(stored: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, type]) -> Any:
-    """The inverse of `packed`; `kinds` are the frozen values that may be in it, by name.
+def unpacked(stored: Any, arrays: Mapping[str, np.ndarray], kinds: Kinds) -> Any:
+    """The inverse of `packed`; `kinds` are those that may be in it.
 
     Raises `LookupError` where something in it is none of these, or an array or a reflectance model is not there.
     """

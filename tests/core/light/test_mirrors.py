@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from addon.core.json_values import plain
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.irradiance import direct, gather
 from addon.core.light.mirrors import Mirror, in_their_planes, reflect
@@ -148,12 +146,3 @@ def test_a_noisy_mirror_is_written_in_the_plane_that_it_shows():
     assert np.array_equal(in_their_planes(mesh, ()), vertices)
     backs = replace(mesh, backs=np.array([0], np.int32))
     assert np.array_equal(in_their_planes(backs, (mirror,)), vertices)
-
-
-def test_a_mirror_comes_back_from_json():
-    glass = Mirror(2, np.float32([0, 1, 2]), np.float32([0, 0, 1]), F0)
-    for one in (glass, GLASS):
-        again = Mirror.from_lists(json.loads(json.dumps(plain(one))))
-        for name in ("point", "normal", "f0"):
-            a, b = getattr(one, name), getattr(again, name)
-            assert np.array_equal(a, b) and a.dtype == b.dtype and a.shape == b.shape

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from addon.core.json_values import plain
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
 from addon.core.light.field import LightField
@@ -222,16 +220,6 @@ def test_a_sun_in_the_map_gives_its_irradiance_from_its_place(rows, direction):
     assert np.allclose(E, [30, 20, 10], rtol=1e-3)
     middle = np.einsum("hwj,hw->j", way, radiance[..., 0] * solid)
     assert angle(middle / np.linalg.norm(middle), direction) < 0.05
-
-
-@pytest.mark.parametrize("edges", [None, (0.5, 0.25)])
-def test_a_sun_comes_back_from_json(edges):
-    sun = Sun(np.float32([0, 0.6, 0.8]), np.float32([3, 2, 1]), 0.01, edges is None, edges)
-    again = Sun.from_lists(json.loads(json.dumps(plain(sun))))
-    assert again.note == sun.note and (again.radius, again.seen, again.edges) == (0.01, edges is None, edges)
-    for name in ("direction", "irradiance"):
-        a, b = getattr(sun, name), getattr(again, name)
-        assert np.array_equal(a, b) and a.dtype == b.dtype
 
 
 def test_a_seen_sun_comes_out_of_the_map_and_goes_back_in():
