@@ -75,25 +75,11 @@ class Room:
         """What the objects are called, by their number."""
         return {instance.object_id: instance.name for instance in self.instances}
 
-
-@dataclass(frozen=True)
-class Chosen:
-    """What was chosen for objects, by object_id each.
-
-    Attributes
-    ----------
-    choices : dict of Choice
-    problems : dict of Problem
-        The observations that decided; without objects of which there were none.
-    targets : dict of int
-        The target frame; -1 where there is none.
-    intervals : dict of GlossInterval
-    """
-
-    choices: dict[int, Choice]
-    problems: dict[int, Problem]
-    targets: dict[int, int]
-    intervals: dict[int, GlossInterval]
+    @cached_property
+    def problems(self) -> Problems:
+        """The builder of objects' fitting problems."""
+        # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
+        return Problems(self.field, self.samples, threads=1, seed=self.settings.seed, without=self.settings.without)
 
 
 @dataclass(frozen=True)
@@ -113,13 +99,18 @@ class Looked:
     target: int
 
 
+@dataclass(frozen=True)
+class Chosen(Looked):
+    """The same with what its class says, and how sure its gloss is."""
+
+    interval: GlossInterval
+
+
 LOOKED = kinds_of(Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour)
 """What a stored `Looked` may hold."""
 
 
-def look_at(
-    room: Room, maker: Problems, wanted: Sequence[int], known: Mapping[int, Looked] | None = None
-) -> dict[int, Looked]:
+def look_at(room: Room, wanted: Sequence[int], known: Mapping[int, Looked] | None = None) -> dict[int, Looked]:
     """What the frames say of each of the `wanted` objects, by object_id; none depends on which others are wanted.
 
     Parameters
@@ -128,7 +119,7 @@ def look_at(
         What was found of them before.
     """
     guesses = {instance.object_id for instance in room.instances if instance.guess}
-    known, given = known or {}, room.given
+    known, given, maker = known or {}, room.given, room.problems
 
     def look(object_id: int) -> Looked:
         if object_id in known:
@@ -136,7 +127,7 @@ def look_at(
         if object_id in given:
             rays = room.settings.specular_rays
             return Looked(*fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1)
-        return Looked(*_look(room, maker, object_id, object_id in guesses))
+        return Looked(*_look(room, object_id, object_id in guesses))
 
     results: dict[int, Looked] = {}
     size = np.bincount(room.field.atlas.object_id, minlength=max(wanted, default=0) + 1)
@@ -148,8 +139,10 @@ def look_at(
     return {object_id: results[object_id] for object_id in wanted}
 
 
-def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
+def choose_models(room: Room, looks: Mapping[int, Looked]) -> dict[int, Chosen]:
     """Choose a model for each object, by what its frames and its class say; of those that are given, by that alone.
+
+    By object_id.
 
     Parameters
     ----------
@@ -158,7 +151,6 @@ def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     """
     choices = {i: looked.choice for i, looked in looks.items()}
     problems = {i: looked.problem for i, looked in looks.items() if looked.problem is not None}
-    targets = {i: looked.target for i, looked in looks.items()}
     if "class-lobes" not in room.settings.without:
         # That two parts are walls by their shape says nothing of what they are painted with; a common colour does.
         named_ids = {instance.object_id for instance in room.instances if not instance.guess}
@@ -172,7 +164,10 @@ def choose_models(room: Room, looks: Mapping[int, Looked]) -> Chosen:
     intervals = ordered_map(
         lambda i: gloss_interval(choices[i], problems.get(i)), order, room.settings.threads, ahead=len(order)
     )
-    return Chosen(choices, problems, targets, dict(zip(order, intervals, strict=True)))
+    return {
+        i: Chosen(choices[i], looks[i].problem, looks[i].target, interval)
+        for i, interval in zip(order, intervals, strict=True)
+    }
 
 
 def _wall_colours(room: Room) -> dict[int, np.ndarray]:
@@ -188,14 +183,14 @@ def _wall_colours(room: Room) -> dict[int, np.ndarray]:
     return colours
 
 
-def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:
+def _look(room: Room, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:
     """What an object's own frames say: its model, the observations behind that, its target frame.
 
     A `guess` may hold several things: it is called neither metal nor transparent, as that would take the texture of
     all of them, and it is not judged by one colour.
     """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(room, maker, object_id, guess)
+    choice, problem, index = _by_frames(room, object_id, guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
@@ -208,11 +203,11 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
         if see_through is not None:
             choice = set_apart(choice, see_through, is_sure(see_through))
     if choice.model.has_albedo and not guess:
-        choice, problem = _by_looks(room, maker, object_id, choice, problem)
+        choice, problem = _by_looks(room, object_id, choice, problem)
     return choice, problem, target_frame(scores)
 
 
-def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
+def _by_frames(room: Room, object_id: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last; a `guess` is never called metal.
 
     A lamp's highlight lies on one in a hundred of the elements of a wall of tiles, so what shows none is looked at once
@@ -221,10 +216,10 @@ def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tupl
     elements = FIT.part_elements if guess else LEVELS.of_object
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
     rays = room.settings.specular_rays * LEVELS.of_object // elements
-    pick = partial(maker.pick, object_id, elements, FIT.views, seed=1, smooth=True)
+    pick = partial(room.problems.pick, object_id, elements, FIT.views, seed=1, smooth=True)
 
     def look(index: np.ndarray) -> tuple[Choice, Problem, np.ndarray]:
-        problem = maker.problem(index, rays)
+        problem = room.problems.problem(index, rays)
         return choose_model(problem, guess), problem, index
 
     expecting = "highlight-sampling" not in room.settings.without
@@ -243,9 +238,7 @@ def _by_frames(room: Room, maker: Problems, object_id: int, guess: bool) -> tupl
     return second if second[0].model.layered else found
 
 
-def _by_looks(
-    room: Room, maker: Problems, object_id: int, choice: Choice, problem: Problem | None
-) -> tuple[Choice, Problem | None]:
+def _by_looks(room: Room, object_id: int, choice: Choice, problem: Problem | None) -> tuple[Choice, Problem | None]:
     """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
     irradiance, without = room.irradiance, room.settings.without
     if problem is not None and len(np.unique(problem.element)) >= LEVELS.few:
@@ -256,10 +249,10 @@ def _by_looks(
             coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
             if coat is None or coat.ratio > 1:
                 return choice, problem
-    index = maker.pick(object_id, LEVELS.of_object, LEVELS.views, min_views=1, seed=1)
+    index = room.problems.pick(object_id, LEVELS.of_object, LEVELS.views, min_views=1, seed=1)
     if not len(index):
         return choice, problem
-    full_problem = maker.problem(index, room.settings.specular_rays)
+    full_problem = room.problems.problem(index, room.settings.specular_rays)
     looks = compare(full_problem, irradiance)
     if looks is None:
         return choice, problem

@@ -1,7 +1,7 @@
 """All light of a room: lamps and sky, a sun, and what a mesh without objects lacks of it."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -27,24 +27,11 @@ from ..significance import LEVELS
 from ..weighted import weighted_median
 
 
-def with_all_light(
-    dark: LightField,
-    lit_diffuse: LitDiffuse,
-    kinds: LampKinds,
-    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
-    seed: int,
-    tilted: np.ndarray,
-    shining: Collection[int],
-    without: Collection[str],
-    cameras: Sequence[Camera],
-    patches: list[int] | None,
-    whole: np.ndarray,
-) -> tuple[LightField, Light, np.ndarray]:
-    """The room with lamps, sky, sun and mirrors, and what was found of the first two.
+@dataclass(frozen=True)
+class Search:
+    """What light is looked for in, and by what.
 
-    Last, the unseen elements whose radiance the light of a mesh without objects gives, (n,) bool.
-
-    Parameters
+    Attributes
     ----------
     dark : LightField
         As the frames show it, without lamps; dark where no frame saw it.
@@ -55,6 +42,26 @@ def with_all_light(
     whole : (n,) int
         The object of each element before `patches` were set apart.
     """
+
+    dark: LightField
+    lit_diffuse: LitDiffuse
+    kinds: LampKinds
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None
+    seed: int
+    tilted: np.ndarray
+    shining: Collection[int]
+    without: Collection[str]
+    cameras: Sequence[Camera]
+    patches: list[int] | None
+    whole: np.ndarray
+
+
+def with_all_light(search: Search) -> tuple[LightField, Light, np.ndarray]:
+    """The room with lamps, sky, sun and mirrors, and what was found of the first two.
+
+    Last, the unseen elements whose radiance the light of a mesh without objects gives, (n,) bool.
+    """
+    dark, lit_diffuse, find_mirrors, without = search.dark, search.lit_diffuse, search.find_mirrors, search.without
     atlas, seen, tier = dark.atlas, lit_diffuse.seen, lit_diffuse.tier
     clean = seen & (tier == CLEAN)
     reliable = clean & (lit_diffuse.count >= VISIBILITY.enough)
@@ -67,7 +74,11 @@ def with_all_light(
     unseen = [] if "unseen-lamps" in without else unseen
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
-    light = find_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
+    find = partial(
+        find_light, good=good, unseen_objects=unseen, kinds=search.kinds, seed=search.seed, tilted=search.tilted,
+        shining=search.shining, without=without,
+    )  # fmt: skip
+    light = find(field)
 
     def lit(light: Light, sun: Sun | None) -> LightField:
         field = dark.with_sun(sun)
@@ -80,49 +91,37 @@ def with_all_light(
         return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ())
 
     # A mesh whose parts were guessed may lack most of its light, and a sun can be told only once that is known.
-    if patches is not None and "missing-light" not in without:
-        found = with_missing_light(
-            dark, lit(light, dark.sun), light, lit_diffuse, reliable, patches, whole, cameras, without, seed
-        )
+    if search.patches is not None and "missing-light" not in without:
+        found = with_missing_light(search, lit(light, dark.sun), light, reliable, search.patches)
         if found is not None:
             return found
     sun = dark.sun
     if sun is None and len(light.received) and "sun" not in without:
-        unmixed = light.without_mixed(field)
-        lamps = [lamp.object_id for lamp in light.lamps]
-        lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
         light, sun = with_sun_found(
-            unmixed, lit_field, light, good, unseen, kinds, lit_diffuse.clipped > 0.5, seed, tilted, shining, without
+            light.without_mixed(field), light, find, good, lit_diffuse.clipped > 0.5, search.seed
         )
     return lit(light, sun), light, np.zeros(len(atlas), bool)
 
 
 def with_sun_found(
-    unmixed: LightField,
-    lit_field: LightField,
-    light: Light,
-    good: np.ndarray,
-    unseen_objects: list[int],
-    kinds: LampKinds,
-    clipped: np.ndarray,
-    seed: int,
-    tilted: np.ndarray,
-    shining: Collection[int],
-    without: Collection[str],
+    unmixed: LightField, light: Light, find: Callable[..., Light], good: np.ndarray, clipped: np.ndarray, seed: int
 ) -> tuple[Light, Sun | None]:
     """A sun that no frame shows, and lamps and sky under it; without one `light` as it is, to the last bit.
 
     Parameters
     ----------
-    unmixed, lit_field : LightField
-        Without what the frames show of lamps and something else at once; and with the lamps and sky of `light`.
-    good, unseen_objects, kinds, seed, tilted, shining, without
+    unmixed : LightField
+        Without what the frames show of lamps and something else at once.
+    find : callable
+        `find_light` of a field, with all that is the same for each.
+    good : (n,) bool
         As in `find_light`.
     clipped : (n,) bool
         Elements that most frames show clipped.
     """
-    object_id = unmixed.atlas.object_id
-    unlit = ~np.isin(object_id, [lamp.object_id for lamp in light.lamps])
+    object_id, lamps = unmixed.atlas.object_id, [lamp.object_id for lamp in light.lamps]
+    lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
+    unlit = ~np.isin(object_id, lamps)
     free = unlit[light.element]
     sun_fit = find_sun(
         unmixed, light.element[free], light.received[free], good & unlit,
@@ -131,7 +130,7 @@ def with_sun_found(
     if sun_fit is None:
         return light, None
     lit_by_sun = unmixed.with_sun(sun_fit.sun)
-    light_with_sun = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
+    light_with_sun = find(lit_by_sun, before=light)
     if not len(light_with_sun.received):
         return light_with_sun, sun_fit.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is solved for again beside them.
@@ -141,16 +140,7 @@ def with_sun_found(
 
 
 def with_missing_light(
-    dark: LightField,
-    field: LightField,
-    light: Light,
-    lit_diffuse: LitDiffuse,
-    good: np.ndarray,
-    patches: list[int],
-    whole: np.ndarray,
-    cameras: Sequence[Camera],
-    without: Collection[str],
-    seed: int,
+    search: Search, field: LightField, light: Light, good: np.ndarray, patches: list[int]
 ) -> tuple[LightField, Light, np.ndarray] | None:
     """A room that lacks light with that of clipped patches and openings, and a sun's; None if nothing tells of any.
 
@@ -158,15 +148,12 @@ def with_missing_light(
 
     Parameters
     ----------
-    dark : LightField
-        As the frames show it, without lamps, dark where no frame saw it.
     field : LightField
         With all `light` that was found otherwise.
     good : (n,) bool
         Elements whose L_d is to be believed.
-    whole : (n,) int
-        The object of each element before `patches` were set apart.
     """
+    dark, lit_diffuse, whole, seed = search.dark, search.lit_diffuse, search.whole, search.seed
     measured = measured_patches(patches, field.atlas, lit_diffuse)
     bright = np.isin(field.atlas.object_id, [*measured, *(mirror.object_id for mirror in field.mirrors)])
     reflecting = dark.with_mirrors(field.mirrors)
@@ -174,14 +161,16 @@ def with_missing_light(
     if reliable.sum() < LEVELS.many:
         return None
     median_luminance = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
-    windows, directions = looked_out_by(cameras, field.scene, field.environment, median_luminance, *field.outer_box)
+    windows, directions = looked_out_by(
+        search.cameras, field.scene, field.environment, median_luminance, *field.outer_box
+    )
     # What is seen through a crack is near, and says nothing of what lies in that direction.
     reflecting = reflecting.with_light(reflecting.radiance, reflecting.environment.shown_in(directions))
     missing = find_missing_light(reflecting, reliable, unknown, seed, windows)
     if not missing.believed:
         return None
     lit_field, light_found = with_found_light(dark, field, light, lit_diffuse, missing, measured)
-    if "sun" in without or dark.sun is not None:
+    if "sun" in search.without or dark.sun is not None:
         return lit_field, light_found, missing.shut
     element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
     irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
@@ -190,7 +179,7 @@ def with_missing_light(
     if solved is None:
         return lit_field, light_found, missing.shut
     bound, sunlit, dark = dark.radiance, np.zeros(len(clipped), bool), dark.with_sun(solved.sun)
-    if "clipped-sunlight" not in without:
+    if "clipped-sunlight" not in search.without:
         dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, received, whole))
         sunlit = (dark.radiance > bound).any(1)
         unknown = np.setdiff1d(unknown, dark.atlas.object_id[sunlit]).tolist()

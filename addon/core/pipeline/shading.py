@@ -33,7 +33,7 @@ from ..scene.surface import Surface
 from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN
 from ..settings import Settings
-from .find_light import with_all_light
+from .find_light import Search, with_all_light
 from .frames import STAGE as FRAMES
 from .frames import Observed
 from .published import light as published_light
@@ -187,10 +187,10 @@ def shade(
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **gathering)
     kinds = lamp_kinds(mesh, instances, surface.noise)
-    field, light, solved = with_all_light(
+    field, light, solved = with_all_light(Search(
         dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, cameras, patches,
         atlas.object_id if whole is None else whole,
-    )  # fmt: skip
+    ))  # fmt: skip
     del dark
     field = field.with_unseen(None)  # the search for lamps alone asked for it
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
-from ..light.field import LightField
 from ..light.over_surface import sun_irradiance
 from ..light.sun import Sun
 from ..memory import give_back
@@ -21,7 +21,6 @@ from ..passes.see_through.see_through import look_behind
 from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
 from ..passes.specular.given import given_note, same_material
 from ..passes.specular.params import FIT
-from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular_removal.removal import SpecularPart, without_specular
 from ..passes.sun.sun_strength import strength_without_gloss
@@ -32,7 +31,6 @@ from ..results.values import kinds_of, packed, unpacked
 from ..scene.element_groups import ElementGroups
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance, Pixels, class_names
-from ..scene.samples import Samples
 from ..scene.visibility import SATURATED
 from ..significance import LEVELS
 from .choose_models import Chosen, Looked, Room, choose_models, look_at
@@ -151,13 +149,13 @@ def fit_specular(
     instances, field, given, settings = room.instances, room.field, room.given, room.settings
     without, refine = settings.without, settings.refine
     refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
-    maker, wanted = _problems_and_objects(room, held)
+    wanted = _wanted(room, held)
     target_lobes: dict[int, ObjectMaterial] = {}
     if "specular" in settings.published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
         target_lobes = fit_targets(others, room)
         wanted = [i for i in wanted if i not in target_lobes]
-    looks = look_at(room, maker, wanted, looked)
+    looks = look_at(room, wanted, looked)
     chosen = choose_models(room, looks)
 
     held_materials = (
@@ -166,7 +164,7 @@ def fit_specular(
     by_id = {
         instance.object_id: held_materials.get(instance.object_id)
         or target_lobes.get(instance.object_id)
-        or _describe(instance, room, chosen)
+        or _describe(instance, room, chosen.get(instance.object_id))
         for instance in instances
     }
     _copy_same_materials(by_id, given, set(held_materials))
@@ -183,7 +181,7 @@ def fit_specular(
         rest = rest.where(again, held.found.rest)
     if refine:
         fitted = [m for m in materials if m.object_id not in held_materials]
-        _without_backgrounds(specular, fitted, room, maker)
+        _without_backgrounds(specular, fitted, room)
         if pictures is not None:
             rest = _remove(specular, rest, fitted, room, pictures)
     rest = replace(rest, radiance=room.lit_diffuse.radiance - specular)
@@ -235,22 +233,13 @@ def look_at_block(room: Room, block: tuple[int, int]) -> dict[int, Looked]:
     InterruptedRun
         From the room's progress.
     """
-    maker, wanted = _problems_and_objects(room, None)
-    return look_at(room, maker, wanted[block[0] - 1 :: block[1]])
+    return look_at(room, _wanted(room)[block[0] - 1 :: block[1]])
 
 
-def _problems_and_objects(room: Room, held: Held | None) -> tuple[Problems, list[int]]:
-    """The builder of objects' fitting problems, and the objects that a model is to be chosen for."""
-    found_before = {lamp.object_id for lamp in room.lamps} | {mirror.object_id for mirror in room.field.mirrors}
-    # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
-    maker = Problems(room.field, room.samples, threads=1, seed=room.settings.seed, without=room.settings.without)
-    return maker, _wanted(room.instances, found_before, room.given, held)
-
-
-def _wanted(
-    instances: tuple[Instance, ...], found_before: set[int], given: Mapping[int, Given], held: Held | None
-) -> list[int]:
+def _wanted(room: Room, held: Held | None = None) -> list[int]:
     """Objects that a model is to be chosen for. What is given goes before what the shading stage found."""
+    instances, given = room.instances, room.given
+    found_before = {lamp.object_id for lamp in room.lamps} | {mirror.object_id for mirror in room.field.mirrors}
     taken = {i for i, entry in given.items() if entry.same_as is not None}
     excluded = {i for i in found_before if i not in given} | taken
     wanted = [i.object_id for i in instances if i.object_id not in excluded]
@@ -262,10 +251,10 @@ def _wanted(
     return [i for i in wanted if i in held.only or i not in given and class_of[i] in classes]
 
 
-def _describe(instance: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
+def _describe(instance: Instance, room: Room, chosen: Chosen | None) -> ObjectMaterial:
     """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
     field, given, number = room.field, room.given, instance.object_id
-    elements, choice = field.atlas.elements_of(number), chosen.choices.get(number)
+    elements = field.atlas.elements_of(number)
 
     def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
         albedo, reason = None, ""
@@ -278,14 +267,13 @@ def _describe(instance: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
             instance, radiance, room.irradiance[elements], " ".join(filter(None, (note, reason))), albedo
         )
 
-    if choice is not None and choice.model.gives_light:
+    if chosen is not None and chosen.choice.model.gives_light:
         median = np.median(field.radiance[elements], 0) if len(elements) else np.zeros(3)
         return lamp(median, given_note(given[number]))
-    if choice is not None:
-        target, interval = chosen.targets[number], chosen.intervals[number]
-        name = room.frame_names[target] if target >= 0 else None
-        material = described(instance, choice, chosen.problems.get(number), name, interval)
-        return as_given(material, given[number], choice, interval) if number in given else material
+    if chosen is not None:
+        name = room.frame_names[chosen.target] if chosen.target >= 0 else None
+        material = described(instance, chosen.choice, chosen.problem, name, chosen.interval)
+        return as_given(material, given[number], chosen.choice, chosen.interval) if number in given else material
     solved_lamp = None if number in given else next((lamp for lamp in room.lamps if lamp.object_id == number), None)
     if solved_lamp is not None:
         return lamp(solved_lamp.radiance, solved_lamp.note(room.names))
@@ -325,28 +313,24 @@ def _remove(
     return rest.where(~glossy_mask, separated.rest)
 
 
-def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems) -> None:
+def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], room: Room) -> None:
     """Put what came from behind glass into `specular`, (n, 3)."""
     glass = [m for m in materials if m.surfaces is not None]
-
-    def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
-        return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
-
-    for elements, part in ordered_map(separate, glass, room.settings.threads):
-        specular[elements] = part
+    parts = ordered_map(partial(_from_behind, room), glass, room.settings.threads)
+    for material, part in zip(glass, parts, strict=True):
+        specular[room.field.atlas.elements_of(material.object_id)] = part
 
 
-def _without_background(
-    material: ObjectMaterial, field: LightField, seen: np.ndarray, maker: Problems, samples: Samples
-) -> tuple[np.ndarray, np.ndarray]:
-    """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
-    elements = field.atlas.elements_of(material.object_id)
-    index = maker.pick(material.object_id, LEVELS.sample, FIT.views, min_views=1, seed=2)
+def _from_behind(room: Room, material: ObjectMaterial) -> np.ndarray:
+    """The part of the L_d of each of a glass object's elements that came from behind, (n, 3)."""
+    atlas, samples, number = room.field.atlas, room.samples, material.object_id
+    elements = atlas.elements_of(number)
+    index = room.problems.pick(number, LEVELS.sample, FIT.views, min_views=1, seed=2)
+    nothing = np.zeros((len(elements), 3), np.float32)
     if not len(index):
-        return elements, np.zeros((len(elements), 3), np.float32)
-    behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)
+        return nothing
+    behind = look_behind(room.field, room.lit_diffuse.seen, samples.element[index], samples.direction[index], number)
     index, transmitted = index[behind.known], np.float32(material.transmission) * behind.radiance[behind.known]
     if not len(index):
-        return elements, np.zeros((len(elements), 3), np.float32)
-    element, part = specular_in_median(samples, index, transmitted)
-    return elements, spread_over_object(field.atlas, elements, element, part)
+        return nothing
+    return spread_over_object(atlas, elements, *specular_in_median(samples, index, transmitted))

@@ -43,7 +43,7 @@ def test_a_class_that_shape_alone_tells_shares_no_lobe_but_walls_of_one_colour_d
     lit_diffuse = SimpleNamespace(seen=seen, radiance=radiance)
     settings = Settings(without=(without,) if without else ())
     room = Room(instances, SimpleNamespace(atlas=atlas), lit_diffuse, irradiance, None, [], settings=settings)
-    models = [choice.model for choice in choose_models(room, looked).choices.values()]
+    models = [chosen.choice.model for _, chosen in sorted(choose_models(room, looked).items())]
     assert models == [DIELECTRIC, DIELECTRIC if shared else LAMBERTIAN]
 
 
@@ -71,7 +71,7 @@ def test_where_highlights_are_expected_decides_of_a_part(guess, anywhere, expect
         pick=lambda *_, highlights, **__: np.array([names.index(expected if highlights else anywhere)]),
         problem=lambda index, rays: problems[names[index[0]]],
     )
-    room = SimpleNamespace(settings=Settings(without=(without,)))
-    choice, problem, index = _by_frames(room, maker, 0, guess)
+    room = SimpleNamespace(settings=Settings(without=(without,)), problems=maker)
+    choice, problem, index = _by_frames(room, 0, guess)
     assert problem is problems[shown] and names[index[0]] == shown
     assert choice.model == (LAMBERTIAN if shown == "bare" else DIELECTRIC)

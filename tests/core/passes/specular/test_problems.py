@@ -62,8 +62,9 @@ def test_a_highlight_on_few_elements_is_found_where_it_is_expected(psi):
         )  # fmt: skip
         maker = Problems(box.field, samples, threads=2)
         for without in glossy:
-            room = SimpleNamespace(settings=Settings(specular_rays=64, threads=2, without=(without,)))
-            glossy[without] += _by_frames(room, maker, FLOOR, False)[0].model is DIELECTRIC
+            settings = Settings(specular_rays=64, threads=2, without=(without,))
+            room = SimpleNamespace(settings=settings, problems=maker)
+            glossy[without] += _by_frames(room, FLOOR, False)[0].model is DIELECTRIC
     if psi:
         assert glossy["highlight-sampling"] < glossy[""] >= 3
     else:
