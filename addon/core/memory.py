@@ -154,19 +154,11 @@ def _windows_peak() -> int | None:
         return None
     from ctypes import wintypes
 
-    sizes = (
-        "peak",
-        "now",
-        "quota_peak_paged",
-        "quota_paged",
-        "quota_peak_nonpaged",
-        "quota_nonpaged",
-        "pagefile",
-        "peak_pagefile",
-    )
-
     class Counters(ctypes.Structure):
-        _fields_ = [("cb", wintypes.DWORD), ("faults", wintypes.DWORD), *((name, ctypes.c_size_t) for name in sizes)]
+        _fields_ = [
+            ("cb", wintypes.DWORD), ("faults", wintypes.DWORD), ("peak", ctypes.c_size_t),
+            ("others", ctypes.c_size_t * 7),
+        ]  # fmt: skip
 
     counters = Counters(cb=ctypes.sizeof(Counters))
     try:
@@ -185,10 +177,11 @@ def _windows_free() -> int | None:
         return None
     from ctypes import wintypes
 
-    sizes = ("total", "free", "total_page", "free_page", "total_virtual", "free_virtual", "extended")
-
     class Status(ctypes.Structure):
-        _fields_ = [("length", wintypes.DWORD), ("load", wintypes.DWORD), *((name, ctypes.c_uint64) for name in sizes)]
+        _fields_ = [
+            ("length", wintypes.DWORD), ("load", wintypes.DWORD), ("total", ctypes.c_uint64),
+            ("free", ctypes.c_uint64), ("others", ctypes.c_uint64 * 5),
+        ]  # fmt: skip
 
     status = Status(length=ctypes.sizeof(Status))
     try:

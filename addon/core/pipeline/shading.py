@@ -76,14 +76,7 @@ def find_shading(
         patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit_diffuse)
         surface = patches.surface(surface)
     if parts_guessed and s.mirrors and "mirrors" not in s.without:
-        field = LightField(
-            surface.mesh,
-            surface.atlas,
-            surface.scene,
-            unseen_dark(lit_diffuse),
-            observed.environment,
-            lookup=surface.lookup,
-        )
+        field = field_over(surface, unseen_dark(lit_diffuse), observed.environment)
         panes = mirror_patches(field, observed.samples)
         patches, surface = Patches.together([patches, panes]), panes.surface(surface)
     if not parts_guessed and "material-parts" not in s.without:
@@ -119,12 +112,17 @@ def with_patches_of(shading: Shading, patches: Patches, groups: list[list[int]])
     return replace(shading, lamps=renumbered(shading.lamps), mirrors=renumbered(shading.mirrors), patches=chosen)
 
 
+def field_over(
+    surface: Surface, radiance: np.ndarray, environment: Environment, lamps: Collection[int] = ()
+) -> LightField:
+    """The light field over a surface."""
+    return LightField(surface.mesh, surface.atlas, surface.scene, radiance, environment, lamps, surface.lookup)
+
+
 def lit_room(surface: Surface, shading: Shading) -> LightField:
     """The room as a light source, with all that was found of its light."""
     lamps = [lamp.object_id for lamp in shading.lamps]
-    room = LightField(
-        surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps, surface.lookup
-    )
+    room = field_over(surface, shading.radiance, shading.environment, lamps)
     return room.with_mirrors(shading.mirrors).with_sun(shading.sun).with_openings(shading.openings)
 
 
@@ -180,9 +178,7 @@ def shade(
 
     environment, sun = (environment, None) if "seen-sun" in without else extract_sun(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    dark = LightField(
-        mesh, atlas, surface.scene, unseen_dark(lit_diffuse), environment, lookup=surface.lookup
-    ).with_sun(sun)
+    dark = field_over(surface, unseen_dark(lit_diffuse), environment).with_sun(sun)
     clean = lit_diffuse.seen & (lit_diffuse.tier == CLEAN)
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **gathering)
