@@ -8,7 +8,6 @@ import sys
 
 import pytest
 
-pytest.importorskip("hypothesis", reason="hypothesis is not installed: spoiled files are not tried")
 from tests.hostile import kills, spoiled_files
 
 pytestmark = [pytest.mark.slow, pytest.mark.once, pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")]

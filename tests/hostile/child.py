@@ -12,7 +12,8 @@ import traceback
 from pathlib import Path
 
 from addon.core.errors import ScanRelightError
-from tests.hostile import formats, spoil
+from tests.core.io.hostile import spoiling
+from tests.hostile import formats
 from tests.hostile.readers import readers
 
 
@@ -62,7 +63,7 @@ def main(limit: int) -> None:
                 how, said = attempt(known[name], root, made[name].name)
                 if how == "traceback" or how == "refused" and not name.startswith("result"):
                     raise RuntimeError(f"{name} is not good before it is spoiled: {said}")
-            content = (spoil if seed >= 0 else formats).spoiled(good[name], seed & (1 << 63) - 1)
+            content = (spoiling if seed >= 0 else formats).spoiled(good[name], seed & (1 << 63) - 1)
             made[name].write_bytes(content)
             before, started = peak(), time.process_time()
             how, said = attempt(known[name], root, made[name].name)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tests.core.io.hostile.spoiling import _places
+from tests.core.io.hostile.spoiling import places as places_of
 
 INTS = (0, 1, 2, 3, 7, 255, 256, 65535, 1 << 20, (1 << 31) - 1, 1 << 31, (1 << 32) - 1)
 REALS = (0.0, -0.0, 1e-320, 1e-30, 1e30, 1e154, 1e300, 1.7e308, -1e308, np.nan, np.inf, -np.inf, 1e6, -1.0, 0.5)
@@ -27,7 +27,7 @@ Rng = np.random.Generator
 
 
 def spoiled(content: bytes, seed: int) -> bytes:
-    """One of the ways that the file's format has; by its bytes alone, as `spoil.py` does, none."""
+    """One of the ways that the file's format has; by its bytes alone, as `spoiling.py` does, none."""
     rng = np.random.default_rng([seed, 1])
     for begins, spoil in KINDS.items():
         if re.match(begins, content, re.DOTALL):
@@ -200,7 +200,7 @@ def _json(content: bytes, rng: Rng) -> bytes:
         value = json.loads(content)
     except (ValueError, RecursionError):
         return content
-    places = list(_places(value))
+    places = list(places_of(value))
     if not places:
         return content
     what, (holder, key) = rng.integers(6), _one(rng, places)

@@ -1,12 +1,15 @@
-"""What goes wrong with files, and what someone could make go wrong with them, as Hypothesis strategies."""
+"""Spoils a file's content, the same for the same seed: blows that know no format, some that know numbers or JSON."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import struct
 
-from hypothesis import strategies as st
+import numpy as np
+
+from tests.core.io.hostile.blows import spoiled as bytes_spoiled
 
 NUMBERS = (
     "nan",
@@ -77,117 +80,87 @@ VALUES = (
 )
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 
+LONG = (b"A" * 70_000, b"[" * 5_000, b"\n" * 1000, b"9" * 400, b"\xef\xbb\xbf", b"\0" * 64)
 
-@st.composite
-def bytes_spoiled(draw, content: bytes) -> bytes:
-    """One to three blows, none of which knows the format."""
-    for _ in range(draw(st.integers(1, 3))):
-        content = draw(st.sampled_from(BLOWS))(draw, content)
+
+def spoiled(content: bytes, seed: int) -> bytes:
+    """One of the ways to spoil `content`."""
+    rng = np.random.default_rng(seed)
+    way = rng.integers(0, 10)
+    if way < 3:
+        with contextlib.suppress(ValueError, RecursionError):
+            return _json(json.loads(content), rng)
+    if way < 6 and b"\0" not in content[:200]:
+        return _numbers(content, rng)
+    if way == 6:
+        return _lines(content, rng)
+    return bytes_spoiled(content, min(len(content), 800), rng)
+
+
+def words_spoiled(content: bytes, seed: int) -> bytes:
+    """One to three blows with words that are a number's end, no text, or of the other byte order."""
+    rng = np.random.default_rng([seed, 2])
+    for _ in range(rng.integers(1, 4)):
+        start, end = sorted(rng.integers(0, max(len(content), 1), 2).tolist())
+        word = WORDS[rng.integers(len(WORDS))]
+        content = (
+            content[:start] + word + content[start + len(word) :],
+            content[:start] + word + content[start:],
+            content[:start] + content[start : start + 4][::-1] + content[start + 4 :],
+            content[:end] + content[start:end] * int(rng.integers(1, 4)) + content[end:],
+            content[:start],
+        )[rng.integers(5)]
     return content
 
 
-def _place(draw, content: bytes) -> int:
-    return draw(st.integers(0, max(len(content) - 1, 0)))
+def _numbers(content: bytes, rng: np.random.Generator) -> bytes:
+    for _ in range(rng.integers(1, 4)):
+        found = list(NUMBER.finditer(content))
+        if found:
+            one = found[rng.integers(len(found))]
+            content = content[: one.start()] + NUMBERS[rng.integers(len(NUMBERS))].encode() + content[one.end() :]
+    return content
 
 
-def cut(draw, content):
-    return content[: _place(draw, content)]
-
-
-def flip(draw, content):
-    at = _place(draw, content)
-    return content[:at] + bytes(draw(st.integers(0, 255)) for _ in content[at : at + 1]) + content[at + 1 :]
-
-
-def overwrite(draw, content):
-    at, word = _place(draw, content), draw(st.sampled_from(WORDS))
-    return content[:at] + word + content[at + len(word) :]
-
-
-def insert(draw, content):
-    at = _place(draw, content)
-    return content[:at] + draw(st.sampled_from((*WORDS, b"A" * 70_000, b"[" * 5_000, b"\n" * 1000))) + content[at:]
-
-
-def repeat(draw, content):
-    start, end = sorted((_place(draw, content), _place(draw, content)))
-    return content[:end] + content[start:end] * draw(st.integers(1, 3)) + content[end:]
-
-
-def remove(draw, content):
-    start, end = sorted((_place(draw, content), _place(draw, content)))
-    return content[:start] + content[end:]
-
-
-def swap_lines(draw, content):
+def _lines(content: bytes, rng: np.random.Generator) -> bytes:
     lines = content.split(b"\n")
-    i, j = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
-    lines[i], lines[j] = lines[j], lines[i]
+    i, j = rng.integers(0, len(lines), 2)
+    what = rng.integers(0, 4)
+    if what == 0:
+        lines[i], lines[j] = lines[j], lines[i]
+    elif what == 1:
+        lines[i:i] = [lines[j]] * int(rng.integers(1, 2000))
+    elif what == 2:
+        lines[i] = LONG[rng.integers(len(LONG))] + lines[i]
+    else:
+        del lines[min(i, j) : max(i, j)]
     return b"\n".join(lines)
 
 
-def number(draw, content):
-    found = list(NUMBER.finditer(content))
-    if not found:
-        return content
-    match = draw(st.sampled_from(found))
-    return content[: match.start()] + draw(st.sampled_from(NUMBERS)).encode() + content[match.end() :]
-
-
-def other_endian(draw, content):
-    at = _place(draw, content)
-    return content[:at] + content[at : at + 4][::-1] + content[at + 4 :]
-
-
-def emptied(draw, content):
-    return b""
-
-
-BLOWS = (
-    cut,
-    flip,
-    flip,
-    overwrite,
-    overwrite,
-    insert,
-    repeat,
-    remove,
-    swap_lines,
-    number,
-    number,
-    number,
-    other_endian,
-    emptied,
-)
-
-
-@st.composite
-def json_spoiled(draw, content: bytes) -> bytes:
-    """The file's object with one to three of its values replaced, removed, doubled or nested."""
-    value = json.loads(content)
-    for _ in range(draw(st.integers(1, 3))):
-        places = list(_places(value))
-        if not places:
+def _json(value: object, rng: np.random.Generator) -> bytes:
+    for _ in range(rng.integers(1, 4)):
+        held = list(places(value))
+        if not held:
             break
-        holder, key = draw(st.sampled_from(places))
-        what = draw(st.integers(0, 4))
+        holder, key = held[rng.integers(len(held))]
+        what = rng.integers(0, 5)
         if what <= 1:
-            holder[key] = draw(st.sampled_from(VALUES))
+            holder[key] = VALUES[rng.integers(len(VALUES))]
         elif what == 2:
             del holder[key]
         elif what == 3 and isinstance(holder, list):
-            holder.insert(key, holder[key])
+            holder[key:key] = [holder[key]] * int(rng.integers(1, 100))
         else:
             nested = holder[key]
-            for _ in range(draw(st.sampled_from((1, 50, 400)))):
+            for _ in range(rng.choice((1, 50, 400))):
                 nested = [nested]
             holder[key] = nested
     return json.dumps(value).encode()
 
 
-def _places(value):
+def places(value):
     """Each (container, key) of a JSON value, the containers first met."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in list(items):
         yield value, key
-        yield from _places(inner)
+        yield from places(inner)
