@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import sys
-import tempfile
 
 import pytest
-
-os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 
 def honest(scene):

@@ -79,26 +79,30 @@ class Box:
         return element, (way / np.linalg.norm(way, axis=1, keepdims=True)).astype(np.float32), frame
 
     def lobe(self, element, direction, phi: float, across: int = 40, rise=fresnel_rise):
-        """A and B, (m, 3) each: the normals' distribution cut into across * across cells of equal weight."""
+        """A and B of elements, (m, 3) each; as `lobe_at`."""
+        return self.lobe_at(self.room.atlas.position[element].astype(float), direction.astype(float), phi, across, rise)
+
+    def lobe_at(self, position, direction, phi: float, across: int, rise=fresnel_rise):
+        """A and B at points, (m, 3) each: the normals' distribution cut into across * across cells of equal weight."""
         u, v = np.meshgrid(*[(np.arange(across) + 0.5) / across] * 2, indexing="ij")
         angle, turn = np.arctan(phi * np.sqrt(u.ravel() / (1 - u.ravel()))), 2 * np.pi * v.ravel()
         h = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], -1)
-        A, B = np.zeros((len(element), 3)), np.zeros((len(element), 3))
-        position = self.room.atlas.position[element].astype(float)
-        for i, wo in enumerate(direction.astype(float)):
-            cosine = h @ wo
-            w = 2 * cosine[:, None] * h - wo
-            up = (w[:, 2] > 1e-4) & (cosine > 0)
-            w, c, n_h = w[up], cosine[up], h[up, 2]
+        A, B = np.zeros((len(position), 3)), np.zeros((len(position), 3))
 
-            def masking(x):
-                return 2 / (1 + np.sqrt(1 + phi**2 * (1 / x**2 - 1)))
+        def masking(x):
+            return 2 / (1 + np.sqrt(1 + phi**2 * (1 / x**2 - 1)))
 
+        for start in range(0, len(position), 200):
+            part = slice(start, start + 200)
+            c = direction[part] @ h.T
+            w = 2 * c[..., None] * h - direction[part, None]
+            up = (w[..., 2] > 1e-4) & (c > 0)
             # f cos dw = G2 F / (4 n.w n.wo) D n.w 4 (wo.h) dh, and D (n.h) dh is one cell
-            share = masking(w[:, 2]) * masking(wo[2]) * c / (wo[2] * n_h) / across**2
-            L = self.arriving(np.broadcast_to(position[i], w.shape), w)
+            n_w, n_wo = np.maximum(w[..., 2], 1e-4), direction[part, 2:]
+            share = np.where(up, masking(n_w) * masking(n_wo) * c / (n_wo * h[:, 2]), 0) / across**2
+            L = self.arriving(np.repeat(position[part], len(h), 0), w.reshape(-1, 3)).reshape(*c.shape, 3)
             s = rise(c)
-            A[i], B[i] = ((1 - s) * share) @ L, (s * share) @ L
+            A[part], B[part] = (np.einsum("mk,mkc->mc", share * x, L) for x in (1 - s, s))
         return A, B
 
     def problem(self, element, direction, phi, psi, diffuse, noise=0.02, rays=256, seed=0) -> Problem:

@@ -25,6 +25,20 @@ CHEAP = replace(QUICK, specular="target", refine=0, mirrors=False)
 EYES = (1.7, 1.3, 1.1), (2.3, 1.7, 1.4), (1.1, 1.9, 1.6), (2.9, 1.2, 0.9)
 
 
+def write_mesh(root: Path, vertices: np.ndarray, faces: np.ndarray, ids: np.ndarray, classes=None) -> None:
+    """A capture's mesh and what its objects are: `classes` by object_id, "thing 0" and so on where absent."""
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    lines += ["property int object_id", "end_header"]
+    lines += [" ".join(map(repr, vertex)) for vertex in vertices.tolist()]
+    lines += [f"3 {a} {b} {c} {i}" for (a, b, c), i in zip(faces.tolist(), ids.tolist(), strict=True)]
+    (root / "mesh.ply").write_text("\n".join(lines) + "\n")
+    classes = classes or {}
+    objects = [{"id": int(i), "class_name": classes.get(int(i), f"thing {i}")} for i in np.unique(ids)]
+    (root / "info_semantic.json").write_text(json.dumps({"objects": objects}))
+
+
 class OnDisk:
     """A room, its pictures and the capture they are written to. `shift` moves all of it away from the origin."""
 
@@ -46,15 +60,7 @@ class OnDisk:
         same = {"w": one.width, "h": one.height, "fl_x": one.fx, "fl_y": one.fy, "cx": one.cx, "cy": one.cy}
         (root / "transforms.json").write_text(json.dumps(same | {"frames": entries}))
         mesh = self.room.mesh
-        lines = ["ply", "format ascii 1.0", f"element vertex {len(mesh.vertices)}"]
-        lines += [f"property double {axis}" for axis in "xyz"]
-        lines += [f"element face {len(mesh.triangles)}", "property list uchar int vertex_indices"]
-        lines += ["property int object_id", "end_header"]
-        lines += [" ".join(map(repr, (vertex + self.shift).tolist())) for vertex in mesh.vertices]
-        lines += [f"3 {a} {b} {c} {i}" for (a, b, c), i in zip(mesh.triangles.tolist(), mesh.object_id.tolist())]
-        (root / "mesh.ply").write_text("\n".join(lines) + "\n")
-        names = {"objects": [{"id": i.object_id, "class_name": f"thing {i.object_id}"} for i in self.room.instances]}
-        (root / "info_semantic.json").write_text(json.dumps(names))
+        write_mesh(root, mesh.vertices + self.shift, mesh.triangles, mesh.object_id)
 
     def path(self, i: int) -> Path:
         return self.root / "images" / f"{i:03d}.exr"
@@ -62,6 +68,10 @@ class OnDisk:
     def unwrap(self, mesh, size):
         assert len(mesh.triangles) == len(self.room.mesh.triangles)
         return self.room.uv
+
+    def recovery(self, store: Store, settings: Settings = CHEAP, progress: Progress | None = None) -> Recovery:
+        """A run that has not begun."""
+        return Recovery(read_capture(self.root), store, settings, progress or Progress(), self.unwrap)
 
     def run(
         self, result: Path, settings: Settings = CHEAP, progress: Progress | None = None, capture=None, overrides=NONE

@@ -22,6 +22,7 @@ from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.scene.model import Camera
 from addon.core.settings import PAPER, Settings
+from tests.core.on_disk import write_mesh
 from tests.core.rooms import Room, all_round, box_sides, lit_box, make_room, picture, quad, radiosity
 
 SIZE = (2.0, 2.0, 2.0)
@@ -159,16 +160,7 @@ class Captured:
         (root / "transforms.json").write_text(json.dumps({"frames": entries}))
         mesh = room.mesh
         vertices, faces, ids, self.uv = triangles or (mesh.vertices, mesh.triangles, mesh.object_id, room.uv)
-        lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
-        lines += [f"property double {axis}" for axis in "xyz"]
-        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-        lines += ["property int object_id", "end_header"]
-        lines += [" ".join(map(repr, row)) for row in (vertices * scale + np.array(shift)).tolist()]
-        lines += [f"3 {a} {b} {c} {i}" for (a, b, c), i in zip(faces.tolist(), ids.tolist(), strict=True)]
-        (root / "mesh.ply").write_text("\n".join(lines) + "\n")
-        names = classes or {}
-        objects = [{"id": int(i), "class_name": names.get(int(i), f"thing {i}")} for i in np.unique(ids)]
-        (root / "info_semantic.json").write_text(json.dumps({"objects": objects}))
+        write_mesh(root, vertices * scale + np.array(shift), faces, ids, classes)
 
     def unwrap(self, mesh, size: int) -> np.ndarray:
         backs = len(mesh.triangles) - len(self.uv)

@@ -50,31 +50,9 @@ class GlossyFloor:
         floor = np.flatnonzero((hits.triangle >= 0) & (room.mesh.object_id[hits.triangle] == 0))
         where = camera.centre + hits.distance[floor, None] * directions[floor]
         where[:, 2] = 0
-        way = -directions[floor].astype(float)
-        image[floor] += self.lobe(where, way)
+        A, B = self.box.lobe_at(where, -directions[floor].astype(float), self.phi, self.across)
+        image[floor] += self.f0 * A + B
         return image.reshape(camera.height, camera.width, 3)
-
-    def lobe(self, where, wo) -> np.ndarray:
-        """F0 A + B of the floor at points, (m, 3), from cells of equal weight of the normals' distribution."""
-        u, v = np.meshgrid(*[(np.arange(self.across) + 0.5) / self.across] * 2, indexing="ij")
-        angle, turn = np.arctan(self.phi * np.sqrt(u.ravel() / (1 - u.ravel()))), 2 * np.pi * v.ravel()
-        h = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], -1)
-
-        def masking(x):
-            return 2 / (1 + np.sqrt(1 + self.phi**2 * (1 / x**2 - 1)))
-
-        total = np.zeros((len(where), 3))
-        for part in range(0, len(where), 200):
-            at = slice(part, part + 200)
-            c = wo[at] @ h.T
-            w = 2 * c[..., None] * h - wo[at, None]
-            up = (w[..., 2] > 1e-4) & (c > 0)
-            s = fresnel_rise(c)
-            n_w, n_wo = np.maximum(w[..., 2], 1e-4), wo[at, 2:]
-            share = np.where(up, masking(n_w) * masking(n_wo) * c / (n_wo * h[:, 2]), 0) / self.across**2
-            L = self.box.arriving(np.repeat(where[at], len(h), 0), w.reshape(-1, 3)).reshape(*c.shape, 3)
-            total[at] = np.einsum("mk,mkc->mc", share * s, L) + self.f0 * np.einsum("mk,mkc->mc", share * (1 - s), L)
-        return total
 
     def recover(self, capture, settings=SETTINGS):
         # The floor's own radiance, as seen in the median, is what the walls get from it: they are not looked at here.

@@ -207,12 +207,8 @@ def with_base_colors(albedo: Albedo, atlas: Atlas, overrides: Overrides) -> Albe
     rho, error = albedo.rho.copy(), albedo.error.copy()
     for object_id, colour in given.items():
         elements = atlas.elements_of(object_id)
-        if not len(elements):
-            continue
-        measured = elements[albedo.origin[elements] == MEASURED]
-        rho[elements] = _coloured(
-            rho[elements], np.isin(elements, measured), atlas.area[elements], np.asarray(colour, np.float32)
-        )
+        measured = albedo.origin[elements] == MEASURED
+        rho[elements] = _coloured(rho[elements], measured, atlas.area[elements], np.asarray(colour, np.float32))
         error[elements] = 0
     return replace(albedo, rho=rho, error=error)
 

@@ -70,23 +70,15 @@ def room(ops, tmp_path, finished):
 
 def recover(ops, tmp_path, **more):
     assert ops.capture_from_scene(result_folder=str(tmp_path / "result")) == {"FINISHED"}
-    assert ops.recover(
-        capture_folder=str(tmp_path / "result" / "scene_capture"),
-        result_folder=str(tmp_path / "result"),
-        **QUICK,
-        **more,
-    ) == {"FINISHED"}
-    return json.loads((tmp_path / "result" / "report.json").read_text())["warnings"]
+    return again(ops.recover, tmp_path, **more)
 
 
-def again(ops, tmp_path, **more):
-    assert ops.write(
-        capture_folder=str(tmp_path / "result" / "scene_capture"),
-        result_folder=str(tmp_path / "result"),
-        **QUICK,
-        **more,
-    ) == {"FINISHED"}
-    return json.loads((tmp_path / "result" / "report.json").read_text())["warnings"]
+def again(operator, tmp_path, **more):
+    """The report's warnings after a run of an operator, `recover` or `write`."""
+    folder = tmp_path / "result"
+    folders = {"capture_folder": str(folder / "scene_capture"), "result_folder": str(folder)}
+    assert operator(**folders, **QUICK, **more) == {"FINISHED"}
+    return json.loads((folder / "report.json").read_text())["warnings"]
 
 
 def models(thing):
@@ -149,7 +141,7 @@ def test_copies_of_what_modifiers_and_instances_make(ops, room, tmp_path):
     board = bpy.data.objects["shelf/board 1 (Scan Relight)"]
     assert min((board.matrix_world @ vertex.co).z for vertex in board.data.vertices) == pytest.approx(1.6)
     count = len(bpy.data.objects)
-    again(ops, tmp_path, copies=True)
+    again(ops.write, tmp_path, copies=True)
     assert len(bpy.data.objects) == count and "round (Scan Relight)" in bpy.data.objects
     for thing in bpy.context.scene.objects:
         thing.select_set(thing.name == "round (Scan Relight)")
@@ -167,7 +159,7 @@ def test_what_changed_since_is_told_and_left(ops, room, tmp_path):
     room["bare"].data.clear_geometry()
     room["bent"].name = "other"
     room["room"].data.vertices[0].co.x -= 0.01  # moved, not rebuilt
-    warnings = " ".join(again(ops, tmp_path))
+    warnings = " ".join(again(ops.write, tmp_path))
     assert "Object 'bare': edited since" in warnings and "Object 'bent': deleted or renamed" in warnings
     assert not models(room["bare"]) and not any(models(room["bent"])) and all(models(room["room"]))
 
@@ -216,7 +208,7 @@ def test_images_and_their_colour_spaces(ops, room, tmp_path, where):
         layout = json.loads((tmp_path / "result" / "materials.json").read_text())["layout"]
         folder = {"RESULT": "//result/", "FOLDER": f"//file images/{layout}/"}.get(where)
         assert folder is None or image.filepath == folder + files[image.name]
-    again(ops, tmp_path, images=where)
+    again(ops.write, tmp_path, images=where)
     assert {image.name for image in bpy.data.images if "scan_relight_image" in image} == set(found)
     bpy.ops.wm.save_mainfile()
     if where == "PACK":

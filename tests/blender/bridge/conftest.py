@@ -1,12 +1,7 @@
 """A fresh factory scene for each test, and tiny Cycles renders of it as arrays."""
 
-import os
-import tempfile
-
 import numpy as np
 import pytest
-
-os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 
 @pytest.fixture

@@ -1,16 +1,12 @@
 """The demo's small room, recovered once in its own process, as a result folder; a fresh scene for each test."""
 
-import os
 import subprocess
 import sys
-import tempfile
 
 import numpy as np
 import pytest
 
 from tests.blender.conftest import honest
-
-os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 QUICK = (
     "--shading-rays 16 --specular-rays 4 --emitter-rays 2 --refine 0 --texel-size 0.1 --atlas-size 512 --quiet".split()

@@ -17,9 +17,9 @@ from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import EDGE
 from addon.core.settings import Settings
+from tests.core.on_disk import ALBEDO
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
-ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
 TWO = (((0.3, 0.7), (0.2, 0.3)), ((0.3, 0.7), (0.7, 0.8)))
 
 

@@ -11,7 +11,6 @@ import pytest
 from addon.core.errors import InterruptedRun
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
-from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
@@ -41,7 +40,7 @@ def striped(tmp_path_factory):
 def run(disk, folder, **settings):
     """A written result: its recovery."""
     with Store(folder) as store:
-        recovery = Recovery(read_capture(disk.root), store, replace(COARSE, **settings), Progress(), disk.unwrap)
+        recovery = disk.recovery(store, replace(COARSE, **settings))
         recovery.write_images()
         return recovery
 
@@ -127,8 +126,7 @@ def test_the_look_at_the_frames_is_told_and_stopped_and_done_once(striped, tmp_p
     def write(kind, stop_at=1.0):
         progress = follow(stop_at)
         with Store(tmp_path) as store:
-            settings = replace(COARSE, atlas=kind)
-            recovery = Recovery(read_capture(striped.root), store, settings, progress, striped.unwrap)
+            recovery = striped.recovery(store, replace(COARSE, atlas=kind), progress)
             recovery.specular()
             progress.stage("write")
             recovery.write_images()

@@ -23,7 +23,6 @@ from addon.core.lit_diffuse.exact import Exact
 from addon.core.paper.recover import recover
 from addon.core.passes.albedo.albedo import MEASURED, NONE
 from addon.core.pipeline import frames
-from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.settings import PAPER
@@ -78,7 +77,7 @@ def test_albedo_lamp_and_report(disk, finished):
 
 def test_a_report_of_what_is_done_asks_for_no_further_stage(disk, tmp_path):
     with Store(tmp_path / "result") as store:
-        run = Recovery(read_capture(disk.root), store, CHEAP, Progress(), disk.unwrap)
+        run = disk.recovery(store)
         run.shading()
         assert run.report()["figures"]["lamps"] == [6]
         assert "specular" not in run.done
@@ -250,7 +249,7 @@ def test_the_papers_preset_is_the_paper_alone(disk, tmp_path):
     settings = replace(PAPER, shading_rays=64, specular_rays=64, texel_size=0.2, threads=2)
     run = disk.run(tmp_path / "result", settings)
     with Store(tmp_path / "other") as store:
-        other = Recovery(read_capture(disk.root), store, settings, Progress(), disk.unwrap)
+        other = disk.recovery(store, settings)
         alone = recover(other.surface(), other.frames, other.read, 64, threads=2)
     assert np.array_equal(run.lit.radiance, alone.lit_diffuse, equal_nan=True)
     assert np.array_equal(run.shading.irradiance, alone.irradiance)
@@ -291,7 +290,7 @@ def test_disk_for_observations_is_asked_for_before_frames_are_read(disk, tmp_pat
         monkeypatch.setattr(frames, "shutil", SimpleNamespace(disk_usage=lambda at: SimpleNamespace(free=size)))
         settings = replace(CHEAP, sharpen=False, refine_poses=False)
         with Store(tmp_path / folder) as store:
-            Recovery(read_capture(disk.root), store, settings, Progress(), disk.unwrap).observed()
+            disk.recovery(store, settings).observed()
 
     monkeypatch.setattr(Exact, "HELD", 0)
     monkeypatch.setattr(Exact, "add", count)

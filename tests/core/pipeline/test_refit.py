@@ -213,7 +213,7 @@ def test_what_can_not_be_done_is_one_sentence(disk, result, tmp_path):
 
 def test_stages_of_another_run_are_refused(disk, result):
     with Store(result) as store:  # the shading stage anew with other settings, and stopped there
-        Recovery(read_capture(disk.root), store, replace(QUICK, shading_rays=32), Progress(), disk.unwrap).shading()
+        disk.recovery(store, replace(QUICK, shading_rays=32)).shading()
         with pytest.raises(MissingStageError, match="another run's"):
             Refit(open_result(result, [3]), store, Progress())
 

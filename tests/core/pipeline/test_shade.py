@@ -15,11 +15,9 @@ from addon.core.pipeline import shading as module
 from addon.core.pipeline.shading import shade
 from addon.core.scene.model import Frame
 from addon.core.settings import Settings
+from tests.core.on_disk import ALBEDO, EYES, LAMP
 from tests.core.pipeline.test_light import measured
 from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, quad, radiosity, split
-
-ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
-LAMP = (10, 9, 8)
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +25,7 @@ def lit():
     """A box with a large lamp, and what 24 frames of it give: most elements have enough observations to be believed."""
     room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.1)
     truth = radiosity(room, ALBEDO, {6: LAMP})
-    eyes = (1.7, 1.3, 1.1), (2.3, 1.7, 1.4), (1.1, 1.9, 1.6), (2.9, 1.2, 0.9)
-    cameras = [c for eye in eyes for c in all_round(eye, 64)]
+    cameras = [c for eye in EYES for c in all_round(eye, 64)]
     frames = [Frame(str(i), Path(str(i)), camera) for i, camera in enumerate(cameras)]
     found = accumulate(
         room.mesh, room.atlas, room.scene, frames, lambda frame: picture(room, frame.camera, truth), threads=2

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from addon.core.io.read import read_capture
 from addon.core.pipeline import stage as stage_module
 from addon.core.pipeline import stages
 from addon.core.pipeline.source import CORE, digest
@@ -19,7 +20,7 @@ from addon.core.progress import Progress
 from addon.core.results.overrides import parse
 from addon.core.scene.params import FRAME_CHOICE
 from addon.core.settings import PAPER, Settings
-from tests.core.on_disk import CHEAP, OnDisk
+from tests.core.on_disk import CHEAP
 
 NAMES = [stage.name for stage in STAGES]
 DEFAULT = Settings()
@@ -27,14 +28,7 @@ OTHER = {bool: lambda value: not value, int: lambda value: value + 3, float: lam
 
 
 @pytest.fixture(scope="module")
-def disk(tmp_path_factory):
-    return OnDisk(tmp_path_factory.mktemp("capture") / "capture")
-
-
-@pytest.fixture(scope="module")
 def capture(disk):
-    from addon.core.io.read import read_capture
-
     return read_capture(disk.root)
 
 
