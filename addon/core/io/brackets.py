@@ -63,8 +63,9 @@ def merge(shots: Iterable[Exposed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     valid, exact = np.zeros_like(first.usable), np.zeros_like(first.usable)
     for shot in itertools.chain((first,), shots):
         good = shot.usable & ~shot.clipped
-        with np.errstate(over="ignore", invalid="ignore"):
-            estimate = shot.rgb / np.float32(shot.exposure)
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            exposure = np.float32(shot.exposure)
+            estimate = shot.rgb / exposure
         takes = good | (shot.usable & ~valid)  # a longer exposure that is not clipped, or the first that says anything
         radiance[takes] = estimate[takes]
         exact |= good
@@ -75,7 +76,7 @@ def merge(shots: Iterable[Exposed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             weight *= np.clip((1 - peak / shot.saturation) / (1 - RISE), 0, 1)
             weight *= peak >= FLOOR * shot.saturation
         total += weight[..., None] * np.where(good[..., None], shot.rgb, 0)
-        time += weight * np.float32(shot.exposure)
+        time += weight * exposure
     known = time > 0
     radiance[known] = total[known] / time[known][:, None]
     return radiance, valid, valid & ~exact

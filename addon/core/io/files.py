@@ -112,7 +112,7 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
     Raises
     ------
     BadInputError
-        `value` is no path.
+        `value` is no path, or one that no file can have.
     EscapesError
         It leads out of the capture.
     """
@@ -123,9 +123,14 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
             f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
             "give paths within it, or allow others with --outside."
         )
+    path = (folder or root) / PurePosixPath(value.replace("\\", "/"))
     if PureWindowsPath(value).drive:  # written on Windows: there alone it may lead anywhere
-        return Path(value)
-    return (folder or root) / PurePosixPath(value.replace("\\", "/"))
+        path = Path(value)
+    try:
+        path.is_file()
+    except OSError as error:  # a name longer than any file's, a folder that nobody may look into
+        raise BadInputError(f"The path of frame '{name}' can't be looked up ({error.strerror}); mend it.") from error
+    return path
 
 
 def check_links(root: Path, name: str, files: Iterable[Path]) -> None:

@@ -45,7 +45,7 @@ def read_pixels(frame: Frame) -> Pixels:
         radiance, valid, saturated = merge(_exposed(frame, shot, seen) for shot in shots)
     else:
         rgb, valid, saturated, *_ = _exposed(frame, frame.shots[0], seen)
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             radiance = rgb / np.float32(frame.exposure if frame.radiometry is None else 1)
     valid &= np.isfinite(radiance).all(-1)
     radiance[~valid] = 0

@@ -108,6 +108,7 @@ def _records(content: bytes) -> dict[str, _Records]:
     return records_of
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is not finite is the repair's, which tells of it
 def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
     if "vertex" not in records_of:
         raise ValueError("holds no vertices")
@@ -126,7 +127,8 @@ def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
     triangles, source, corner = _triangles(faces.counts[index], faces.entries(index), vertices)
     ids = faces.columns(("object_id",))
     if ids is not None:
-        whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
+        # What is no whole number, or larger than any, is no object's; NaN is less than nothing.
+        whole = np.where(np.abs(ids) < float(1 << 62), ids, -1) if ids.dtype.kind == "f" else ids
         ids = whole[:, 0].astype(np.int64)[source]
     pair = next((pair for pair in pairs if pair is not None), None)
     uv = None if pair is None else pair.astype(np.float32)[triangles]

@@ -10,6 +10,7 @@ from ..kinds import Limit
 from ..scene.model import KnownMirror
 from ..scene.params import COPLANAR
 from .layout import RawMesh
+from .mesh_repair import MAX_COORDINATE
 
 FILE = "glass.sur"
 MIRROR = 0.5
@@ -55,11 +56,12 @@ def read_panes(path: Path) -> tuple[list[Pane], list[str]]:
             plane = np.array(item["plane_w"], np.float64).ravel()
             boundary = np.array(item["boundary_w"], np.float64).reshape(-1, 3)
             reflectivity = float(item["reflectivity"])
-            length = np.linalg.norm(plane[:3])
         except (KeyError, TypeError, ValueError, OverflowError):
             continue
-        good = plane.size == 4 and len(boundary) >= 3 and np.isfinite(plane).all() and np.isfinite(boundary).all()
-        if good and length > 0 and 0 <= reflectivity <= 1:
+        good = plane.size == 4 and len(boundary) >= 3 and 0 <= reflectivity <= 1
+        good = good and bool((np.abs(np.append(plane, boundary)) < MAX_COORDINATE).all())  # nor NaN
+        length = np.linalg.norm(plane[:3]) if good else 0.0
+        if length > 0:
             panes.append(Pane(plane[:3] / length, -plane[3] / length, boundary, reflectivity))
     bad = len(listed) - len(panes)
     return panes, [f"{bad} of {len(listed)} panes in '{path}' are damaged and left out."] if bad else []
