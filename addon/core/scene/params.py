@@ -343,7 +343,8 @@ class ClosingParams:
     block : int
         Edge in cells of the squares that close what no frame saw, a power of 2: a third of a metre in a room.
     fine : int
-        Parts of a cell's edge: a cell is closed of which one is open, 1.6 cm in a room.
+        Parts of a cell's edge: a cell is closed of which one is open, 0.8 cm in a room. With 4 a kitchen by phone shows
+        234 specks of nothing in twelve views, with 8 and 16 55 and 50.
     speck : int
         Connected cells, of 4 cm in a room: no window is so small, and a hole that is shows black.
     under : float
@@ -351,7 +352,7 @@ class ClosingParams:
     """
 
     block: int = 8
-    fine: int = 4
+    fine: int = 8
     speck: int = 4
     under: float = 0.025
 
