@@ -108,7 +108,7 @@ def albedo_of(
     if "bias-field" not in without:
         rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))
     guesses = {instance.object_id for instance in instances if instance.guess}
-    albedo = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses)
+    albedo = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses, irradiance_error)
     if "class-albedo" in without:
         return albedo
     class_of = class_names(instance for instance in instances if not instance.guess)
@@ -125,6 +125,7 @@ def fill(
     error: np.ndarray | None = None,
     without: Collection[str] = (),
     guesses: Collection[int] = (),
+    shared: np.ndarray | None = None,
 ) -> Albedo:
     """Clamp, fill in what was not measured, and shrink what was measured badly, from the same object.
 
@@ -137,6 +138,8 @@ def fill(
         Where it is inf, the quotient counts as not measured.
     guesses : collection of int
         Objects that were told apart by shape alone.
+    shared : (n,) float32, optional
+        The part of `error` that is E's.
     """
     if error is not None:
         valid = valid & np.isfinite(error)
@@ -162,7 +165,8 @@ def fill(
 
     def shrunk_part(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         references = guessed_references if int(atlas.object_id[elements[0]]) in guesses else None
-        return shrink(atlas, elements, result[elements], error[elements], without, references)
+        part_shared = None if shared is None else shared[elements]
+        return shrink(atlas, elements, result[elements], error[elements], without, references, part_shared)
 
     shrunk_parts = ordered_map(shrunk_part, measured, 0)
     for elements, shrunk in zip(measured, shrunk_parts, strict=True):

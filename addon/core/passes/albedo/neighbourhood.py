@@ -18,6 +18,7 @@ from ...kinds import Block
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
+from ...scene.params import COPLANAR
 from ...scene.visibility import CLEAN, SATURATED
 from ...significance import LEVELS, SIGMA_OF_MAD
 from .params import ALBEDO, PRIOR
@@ -153,6 +154,7 @@ def shrink(
     error: np.ndarray,
     without: Collection[str] = (),
     references: References | None = None,
+    shared: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each shrunk towards its neighbourhood as far as it is uncertain.
 
@@ -166,6 +168,8 @@ def shrink(
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
     references : References, optional
         Elements among which a second colour is looked for, in place of the object's own.
+    shared : (m,) float32, optional
+        The part of `error` that is E's.
 
     Returns
     -------
@@ -197,7 +201,12 @@ def shrink(
     offset = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(median).sum(1, keepdims=True))
     excess = offset**2 - (LEVELS.sigmas * error) ** 2
     variance = np.maximum(width**2, excess)
-    trust = (variance / (variance + error**2)).astype(np.float32)
+    # On an even surface E errs smoothly: what it errs by is its neighbours' too, and no reason to give up texture.
+    facing = atlas.normal[elements[sure]][prior.neighbours].mean(1)
+    even = (np.linalg.norm(facing, axis=1) > np.cos(COPLANAR.turn))[index, None]
+    of_all = 0 if shared is None else np.minimum(shared[todo, None], error)
+    own = np.sqrt(error**2 - even * (1 - PRIOR.own**2) * of_all**2)
+    trust = (variance / (variance + own**2)).astype(np.float32)
     if "albedo-prior" in without:
         trust[:] = 1
     trust[~measured] = 0

@@ -26,6 +26,9 @@ class PriorParams:
     single : float
         Relative standard error of a single observation, whose spread can't be known, at most; and what is added to that
         of observations at depth edges, where another surface is mixed in.
+    own : float
+        Of E's standard error, where the surface is even, this share is an element's own, and of all its error for a
+        second colour; the rest its neighbours have too. On mouldings and at creases E errs from texel to texel.
     single_factor : float
         It is taken for so many times this quantile (one standard deviation of a normal distribution) of the spreads
         that its object's other elements have (`object-spread`). Single observations are made where little is seen, so
@@ -36,6 +39,7 @@ class PriorParams:
     alike: float = 0.7
     cell: float = 6.0
     least_error: float = 0.06
+    own: float = 0.5
     single: float = 0.35
     single_factor: float = 2.0
 
@@ -48,8 +52,6 @@ class SecondColourParams:
     ----------
     by_chance : float
         Share of the neighbours that may lie so far off by chance. With 1/8 nothing is gained in bathrooms.
-    local : float
-        Of an element's standard error this share is its own; the rest, E's above all, its neighbours have too.
     apart : float
         Relative difference between elements of one colour.
     unexplained : float
@@ -57,7 +59,6 @@ class SecondColourParams:
     """
 
     by_chance: float = 1 / 16
-    local: float = 0.5
     apart: float = 0.03
     unexplained: float = 1e-4
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...kinds import Block
 from ...parallel import for_blocks
 from ...significance import LEVELS
-from .params import MAX_ALBEDO, SECOND_COLOUR
+from .params import MAX_ALBEDO, PRIOR, SECOND_COLOUR
 
 BLOCK: Block[int] = 1 << 11
 
@@ -75,7 +75,7 @@ def shrunk_to_second_colour(
         elements = todo[part]
         at = cell[elements]
         index, value = neighbours[at], rho[elements]
-        local = (SECOND_COLOUR.local * error[elements]) ** 2
+        local = (PRIOR.own * error[elements]) ** 2
         of_ground = (1 - real[at] * share[at]) * _normal_density(
             _squared_difference(value, ground[at]), local + width[at] ** 2
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,18 @@ def test_a_pattern_of_well_measured_elements_survives(atlas, share):
     result = run(atlas, grey(np.where(dark, 0.2, 0.6)) * noise, np.full(len(atlas), GOOD))
     assert np.median(result[dark]) == pytest.approx(0.2, rel=0.15)
     assert np.median(result[~dark]) == pytest.approx(0.6, rel=0.05)
+
+
+def test_texture_of_an_even_wall_outlives_what_e_errs_by(atlas):
+    """Each element's error is as large as the texture's contrast; most of it is E's, which the neighbours share."""
+    texture = grey(0.3 * np.exp(np.random.default_rng(0).normal(0, 0.12, len(atlas))))
+    error, own = np.full(len(atlas), 0.12, np.float32), np.arange(len(atlas))
+    bent = replace(atlas, normal=np.where(np.arange(len(atlas))[:, None] % 2, [[0, 0, 1]], [[0, 0.6, 0.8]]))
+    contrast = {
+        name: np.log(shrink(one, own, texture, error, shared=0.95 * error)[0]).std()
+        for name, one in (("even", atlas), ("bent", bent))
+    }
+    assert contrast["even"] > 0.7 * np.log(texture).std() > contrast["bent"]
 
 
 def test_an_outlier_on_an_even_wall_is_pulled_in(atlas):
