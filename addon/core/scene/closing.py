@@ -1,10 +1,11 @@
 """Holes of a mesh that was fused from depth, closed where evidence permits: its large planes are completed.
 
-The planes that bound the room (`shape_parts`) are continued to where they meet each other, the other large planes
-across the holes within them. They are drawn as cells behind the scan's own border, so that nothing of it is hidden and
-no crack is left. Where frames look through such a cell it stays open (`sight`): they see mesh behind it, or something
-brighter than the room, or something that nearly all frames would have fused, unless it shows the same colours at the
-same places rather than in the same directions (photo-consistency: Seitz and Dyer 1999).
+The planes that bound the room (`shape_parts`) are continued to where they meet each other, other planes across the
+holes within them, and to the corners of the rectangle around them where frames show that they fill it. They are drawn
+as cells behind the scan's own border, so that nothing of it is hidden and no crack is left. Where frames look through
+such a cell it stays open (`sight`): they see mesh behind it, or something brighter than the room, or something that
+nearly all frames would have fused, unless it shows the same colours at the same places rather than in the same
+directions (photo-consistency: Seitz and Dyer 1999).
 """
 
 from collections.abc import Callable, Sequence
@@ -35,8 +36,12 @@ class PlaneGrid:
         Where the first cell begins, and unit vectors along columns and rows.
     edge : float
         Of a cell, metres.
+    bounds : bool
+        Whether the plane bounds the room.
+    covered : (h, w) bool
+        Cells with mesh in all of their parts.
     open : (h, w) bool
-        Cells without mesh that the plane may be continued over.
+        Cells without, that the plane may be continued over.
     """
 
     plane: Plane
@@ -44,6 +49,8 @@ class PlaneGrid:
     right: np.ndarray
     up: np.ndarray
     edge: float
+    bounds: bool
+    covered: np.ndarray
     open: np.ndarray
 
     def points(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -176,6 +183,10 @@ def _cells_to_close(
     cells = []
     for grid, closed_cells, seen_cells in by_grid:
         grid_closed, seen = _with_specks_closed(grid.mask(closed_cells), grid.open), grid.mask(seen_cells)
+        if not grid.bounds:
+            # Of a rim narrower than 3 cells the scan covers a part.
+            wide = ndimage.binary_opening(grid_closed, np.ones((3, 3))) & _is_rectangle(grid, grid_closed)
+            grid_closed &= wide | ndimage.binary_fill_holes(grid.covered)
         if grid.plane.name == WALL:
             grid_closed = _with_windows_whole(grid_closed, seen, grid.open)
         cells.append((grid_closed, seen))
@@ -190,6 +201,15 @@ def _groups(grids: Sequence[PlaneGrid], chosen: np.ndarray) -> np.ndarray:
         labels.append(np.where(cells, label[grid.open] + groups - 1, -1))
         groups += count
     return np.concatenate(labels)
+
+
+def _is_rectangle(grid: PlaneGrid, closed: np.ndarray) -> bool:
+    """Whether a plane fills the rectangle around it, as frames see it: they see past an L, and past a round table.
+
+    `closed`, (h, w) bool, are the open cells that frames don't see past.
+    """
+    known = grid.covered | grid.open & ~closed
+    return bool(grid.covered.sum() > CLOSING.rectangle * known.sum())
 
 
 def _with_specks_closed(closed: np.ndarray, candidates: np.ndarray) -> np.ndarray:
@@ -262,19 +282,26 @@ def plane_grids(
         low = np.floor(coordinates.min(0) / gap - 1) * gap
         count = np.ceil((coordinates.max(0) - low) / gap + 1).astype(int)
         corner = (plane.point @ plane.normal) * plane.normal + low[0] * right + low[1] * up
-        grid = PlaneGrid(plane, corner, right, up, gap, np.ones(count[::-1], bool))
         near = np.flatnonzero(np.abs((corners.mean(1) - plane.point) @ plane.normal) < gap)
+        none = np.zeros(count[::-1], bool)
+        grid = PlaneGrid(plane, corner, right, up, gap, bounds, none, ~none)
         covered = _covered(grid, corners[near])
-        if bounds:
-            free = ~covered
-            middle = grid.centres
-            for other in outer:
-                if abs(other.normal @ plane.normal) < np.cos(PARTS.tilt):
-                    free.ravel()[(middle - other.point) @ other.normal < -gap] = False
-        else:
-            free = ndimage.binary_fill_holes(covered) & ~covered
-        grids.append(replace(grid, open=free))
+        free, middle = ~covered, grid.centres
+        for other in outer:
+            if abs(other.normal @ plane.normal) < np.cos(PARTS.tilt):
+                free.ravel()[(middle - other.point) @ other.normal < -gap] = False
+        if not bounds:
+            free &= _rectangle_around(_covered(grid, corners[plane.faces]))
+        grids.append(replace(grid, covered=covered, open=free))
     return grids
+
+
+def _rectangle_around(cells: np.ndarray) -> np.ndarray:
+    """The least rectangle that holds all of the cells, (h, w) bool each."""
+    rectangle = np.zeros_like(cells)
+    for box in ndimage.find_objects(cells.astype(np.int8)):
+        rectangle[box] = True
+    return rectangle
 
 
 def _coincide(a: Plane, b: Plane, gap: float) -> bool:

@@ -27,7 +27,7 @@ WALL: Code[str] = "wall"
 
 @dataclass(frozen=True)
 class Plane:
-    """A large plane of a mesh.
+    """A plane of a mesh.
 
     Attributes
     ----------
@@ -116,15 +116,18 @@ class _Faces:
         return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
 
 
-def _planes(faces: _Faces, gap: float) -> list[Plane]:
-    """Large planes, the best supported first: the densest cell of (direction, offset), then least squares."""
-    minimum_area = PARTS.plane * faces.area.sum()
+def _planes(faces: _Faces, gap: float, least: float, free: np.ndarray) -> list[Plane]:
+    """Planes, the best supported first: the densest cell of (direction, offset), then least squares.
+
+    Each has the share `least` of the surface at least, among the triangles that are `free` ((t,) bool).
+    """
+    minimum_area = least * faces.area.sum()
     directions = fibonacci(PARTS.directions)
     nearest = cKDTree(directions).query(faces.normal)[1]
     offset = np.floor((faces.centre * directions[nearest]).sum(1) / (2 * gap)).astype(np.int64)
     cell = np.unique(np.stack([nearest, offset], 1), axis=0, return_inverse=True)[1].ravel()
-    free, planes = np.ones(faces.count, bool), []
-    support = np.bincount(cell, faces.area)
+    free, planes = free.copy(), []
+    support = np.bincount(cell, faces.area * free)
     while support.max() > PARTS.seed * minimum_area:
         seed = np.flatnonzero((cell == support.argmax()) & free)
         plane = _plane_at(faces, seed, np.flatnonzero(free), gap)
@@ -227,7 +230,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     """
     faces = _Faces(vertices, triangles)
     gap = plane_gap(vertices[triangles.ravel()])
-    planes = _planes(faces, gap)
+    planes = _planes(faces, gap, PARTS.plane, np.ones(faces.count, bool))
     label = np.full(faces.count, -1)
     for k, plane in enumerate(planes):
         label[plane.faces] = k
@@ -239,11 +242,16 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     first = np.unique(piece, return_index=True)[1]  # a triangle of each piece, to find it again
     joined = _over_convex_edges(faces, piece, flat)
     part = np.argsort(np.argsort(-np.bincount(joined, faces.area), kind="stable"))[joined]
-    named_planes = tuple(
+    named_planes = [
         replace(plane, part=int(part[first[plane_piece]]), name=_name(plane, faces, gap))
         for plane_piece, plane in zip(piece_of_plane, planes, strict=True)
-    )
-    return Parts(part, {plane.part: plane.name for plane in named_planes if plane.name}, named_planes)
+    ]
+    small_planes = [
+        replace(plane, part=int(np.bincount(part[plane.faces], faces.area[plane.faces]).argmax()))
+        for plane in _planes(faces, gap, PARTS.small, label < 0)
+    ]
+    names = {plane.part: plane.name for plane in named_planes if plane.name}
+    return Parts(part, names, (*named_planes, *small_planes))
 
 
 def plane_gap(points: np.ndarray) -> float:

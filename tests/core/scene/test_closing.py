@@ -229,6 +229,37 @@ def test_a_niche_stays_open():
     assert not window(added.vertices[added.triangles].mean(1), np.full(len(added.triangles), WALL)).any()
 
 
+def test_the_corner_of_a_wardrobe_is_closed_unless_frames_see_past_it():
+    """No hole within its front, which ends there for all that the mesh tells."""
+
+    def corner(centre, side):
+        return (side == 7) & (np.abs(centre[:, 0] - 0.5) < 0.04) & (centre[:, 1] > 2) & (centre[:, 2] > 1.1)
+
+    vertices, triangles = room(corner)
+    back = np.array([[0.2, 1.7, 0.9], [0.2, 2.4, 0.9], [0.2, 2.4, 1.5], [0.2, 1.7, 1.5]])
+    mesh = (
+        np.concatenate([vertices, back]),
+        np.concatenate([triangles, len(vertices) + np.array([[0, 1, 2], [0, 2, 3]])]),
+    )
+    turned = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])
+    away = [
+        replace(frame, camera=replace(frame.camera, camera_to_world=np.vstack([
+            np.column_stack([turned, frame.camera.centre]), [0, 0, 0, 1],
+        ])))
+        for frame in frames()
+    ]  # fmt: skip
+    share = []
+    for cameras in (away, frames()):
+        added = close_holes(
+            *mesh, parts_of(*mesh), cameras, pictures(*mesh, lambda start, rays: np.full(len(rays), 5.0))
+        )
+        corners = added.vertices[added.triangles]
+        in_front = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 0] / 2
+        centre = corners.mean(1)
+        share.append(in_front[corner(centre, np.full(len(centre), 7))].sum() / (0.4 * 0.4))
+    assert 0.9 < share[0] < 1.3 and abs(share[1]) < 0.05
+
+
 def test_the_scan_comes_back():
     vertices, triangles = room(window)
     more = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
