@@ -357,6 +357,8 @@ def _covered(grid: PlaneGrid, corners: np.ndarray) -> np.ndarray:
     """Cells that triangles ((n, 3, 3)) cover, (h, w) bool: all of it, as a scan is porous where depth is noisy."""
     fine = CLOSING.fine
     covered = np.zeros(np.multiply(grid.open.shape, fine), bool)
+    place = (corners - grid.corner) @ np.stack([grid.up, grid.right], 1) / grid.edge
+    corners = corners[((place.max(1) >= 0) & (place.min(1) <= grid.open.shape)).all(1)]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1, initial=0)
     steps = np.exp2(np.ceil(np.log2(np.maximum(2 * fine * longest / grid.edge, 1)))).astype(int)
     for count in np.unique(steps):

@@ -143,6 +143,8 @@ def _planes(faces: _Faces, gap: float, least: float, free: np.ndarray) -> list[P
 
 def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> Plane | None:
     """The plane through the triangles `seed`, with the `free` ones ((k,) int) that lie in it and are connected."""
+    facing = faces.area[seed] @ faces.normal[seed]
+    free = free[faces.normal[free] @ facing > np.cos(2 * PARTS.tilt) * np.linalg.norm(facing)]
     members = seed
     for _ in range(PARTS.fits):
         weight = faces.area[members]
