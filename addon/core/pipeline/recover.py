@@ -17,6 +17,7 @@ from ..passes.albedo.albedo import CLOSED, FILLED, MEASURED, TEXTURED
 from ..passes.albedo.neighbourhood import relative_error
 from ..passes.texture_fill.texture_fill import NOTHING, Texture, texture_of
 from ..results.room_file import OPENINGS
+from ..scene.closed_mesh import is_outward
 from ..settings import ROOM
 from .corrected import Corrected
 from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
@@ -173,12 +174,14 @@ class Recovery(Corrected):
         self.store.write_json(OPENINGS, {"openings": entries})
 
     def _unseen_closing(self) -> np.ndarray:
-        """Corners of the faces that close the mesh and that no frame saw, (t, 3, 3) float32."""
+        """Corners of the faces that close the mesh towards the outside and that no frame saw, (t, 3, 3) float32."""
         mesh, atlas = self.surface().mesh, self.surface().atlas
         unseen = np.ones(len(mesh.triangles), bool)
         unseen[atlas.triangle[self.lit_diffuse().seen]] = False
-        faces = [] if mesh.closed is None else mesh.closed[unseen[mesh.closed]]
-        return mesh.vertices[mesh.triangles[faces]].astype(np.float32)
+        faces = np.zeros(0, int) if mesh.closed is None else mesh.closed[unseen[mesh.closed]]
+        corners = mesh.vertices[mesh.triangles[faces]].astype(np.float32)
+        normal = mesh.geometry[0][faces].astype(np.float32)
+        return corners[is_outward(self.surface().scene, corners.mean(1), normal)]
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""

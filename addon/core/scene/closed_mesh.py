@@ -40,6 +40,14 @@ def without_closing(capture: Capture) -> Capture:
     )
 
 
+def is_outward(scene: RayScene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Which of n places on faces that close a mesh ((n, 3) float32 each) have no mesh behind them, (n,) bool.
+
+    Light may come in there from outside. The other faces close furniture.
+    """
+    return scene.intersect(scene.off_surface(points, -normals), -normals).triangle < 0
+
+
 def with_aligned_closing(mesh: Mesh) -> Mesh:
     """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.scene.closed_mesh import as_scanned, with_aligned_closing, without_closing
+from addon.core.scene.closed_mesh import as_scanned, is_outward, with_aligned_closing, without_closing
 from addon.core.scene.closing import close_holes
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
@@ -258,6 +258,15 @@ def test_the_corner_of_a_wardrobe_is_closed_unless_frames_see_past_it():
         centre = corners.mean(1)
         share.append(in_front[corner(centre, np.full(len(centre), 7))].sum() / (0.4 * 0.4))
     assert 0.9 < share[0] < 1.3 and abs(share[1]) < 0.05
+
+
+def test_what_has_mesh_behind_it_lets_no_light_in():
+    """The front of a cupboard by a wall, and the wall beside it."""
+    wall = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]], float)
+    front = wall * (1, 0.5, 1) + (0.4, 0, 0)
+    scene = RayScene(np.concatenate([wall, front]), np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]))
+    points, normals = np.float32([[0.4, 0.2, 0.6], [0, 0.7, 0.4]]), np.float32([[1, 0, 0], [1, 0, 0]])
+    assert is_outward(scene, points, normals).tolist() == [False, True]
 
 
 def test_the_scan_comes_back():

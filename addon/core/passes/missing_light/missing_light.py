@@ -20,6 +20,7 @@ from ...light.params import GATHER
 from ...luminance import LUMINANCE
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
+from ...scene.closed_mesh import is_outward
 from ...scene.params import COPLANAR
 from ...significance import LEVELS
 
@@ -264,11 +265,16 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
 
 
 def unseen_closing(field: LightField) -> np.ndarray:
-    """Elements of faces that close the mesh, of which no frame saw what they send: it is dark, (n,) bool."""
+    """Elements of faces that close the mesh towards the outside, of which no frame saw what they send, (n,) bool.
+
+    They are dark in the `field`.
+    """
     closing = np.zeros(len(field.mesh.triangles), bool)
     if field.mesh.closed is not None:
         closing[field.mesh.closed] = True
-    return closing[field.atlas.triangle] & ~field.radiance.any(1)
+    unseen = closing[field.atlas.triangle] & ~field.radiance.any(1)
+    unseen[unseen] = is_outward(field.scene, field.atlas.position[unseen], field.atlas.normal[unseen])
+    return unseen
 
 
 def _through_cells(
