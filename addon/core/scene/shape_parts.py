@@ -104,47 +104,56 @@ class _Faces:
         """Connected components of the triangles over the pairs that are `joined`, (t,) int from 0."""
         return components(self.a[joined], self.b[joined], self.count)
 
-    def largest(self, chosen: np.ndarray) -> np.ndarray:
-        """The connected component with the largest area among the triangles `chosen` ((k,) int), (n,) int."""
+    def largest(self, chosen: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """The connected component with the largest area among the triangles `chosen` ((k,) int), (n,) int.
+
+        `pairs`, (p,) int, are those that may connect them.
+        """
         if not len(chosen):
             return chosen
         local_index = np.full(self.count, -1)
         local_index[chosen] = np.arange(len(chosen))
-        a, b = local_index[self.a], local_index[self.b]
+        a, b = local_index[self.a[pairs]], local_index[self.b[pairs]]
         joined = (a >= 0) & (b >= 0)
         piece = components(a[joined], b[joined], len(chosen))
         return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
 
 
-def _planes(faces: _Faces, gap: float, least: float, free: np.ndarray) -> list[Plane]:
-    """Planes, the best supported first: the densest cell of (direction, offset), then least squares.
+def _cells(faces: _Faces, gap: float) -> np.ndarray:
+    """The cell of (direction, offset) that each triangle lies in, (t,) int."""
+    directions = fibonacci(PARTS.directions)
+    nearest = cKDTree(directions).query(faces.normal)[1]
+    offset = np.floor((faces.centre * directions[nearest]).sum(1) / (2 * gap)).astype(np.int64)
+    return np.unique(np.stack([nearest, offset], 1), axis=0, return_inverse=True)[1].ravel()
+
+
+def _planes(faces: _Faces, cell: np.ndarray, gap: float, least: float, free: np.ndarray) -> list[Plane]:
+    """Planes, the best supported first: the densest `cell`, then least squares.
 
     Each has the share `least` of the surface at least, among the triangles that are `free` ((t,) bool).
     """
     minimum_area = least * faces.area.sum()
-    directions = fibonacci(PARTS.directions)
-    nearest = cKDTree(directions).query(faces.normal)[1]
-    offset = np.floor((faces.centre * directions[nearest]).sum(1) / (2 * gap)).astype(np.int64)
-    cell = np.unique(np.stack([nearest, offset], 1), axis=0, return_inverse=True)[1].ravel()
     free, planes = free.copy(), []
     support = np.bincount(cell, faces.area * free)
     while support.max() > PARTS.seed * minimum_area:
         seed = np.flatnonzero((cell == support.argmax()) & free)
-        plane = _plane_at(faces, seed, np.flatnonzero(free), gap)
+        plane = _plane_at(faces, seed, free, gap)
         large = plane is not None and faces.area[plane.faces].sum() >= minimum_area
         if plane is not None and large and not _is_curved(faces, plane.faces, plane.normal):
             planes.append(plane)
-            free[plane.faces] = False
+            taken = plane.faces
         else:
-            free[seed] = False  # no plane's seed any more, and none's triangles
-        support = np.bincount(cell, faces.area * free, len(support))
+            taken = seed  # no plane's seed any more, and none's triangles
+        free[taken] = False
+        support -= np.bincount(cell[taken], faces.area[taken], len(support))
     return planes
 
 
 def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> Plane | None:
-    """The plane through the triangles `seed`, with the `free` ones ((k,) int) that lie in it and are connected."""
+    """The plane through the triangles `seed`, with the `free` ones ((t,) bool) that lie in it and are connected."""
     facing = faces.area[seed] @ faces.normal[seed]
-    free = free[faces.normal[free] @ facing > np.cos(2 * PARTS.tilt) * np.linalg.norm(facing)]
+    alike = free & (faces.normal @ facing > np.cos(2 * PARTS.tilt) * np.linalg.norm(facing))
+    candidates, pairs = np.flatnonzero(alike), np.flatnonzero(alike[faces.a] & alike[faces.b])
     members = seed
     for _ in range(PARTS.fits):
         weight = faces.area[members]
@@ -152,9 +161,9 @@ def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> 
         weighted_offset = (faces.centre[members] - point) * np.sqrt(weight)[:, None]
         normal = np.linalg.eigh(weighted_offset.T @ weighted_offset)[1][:, 0]
         normal *= np.sign(normal @ (weight @ faces.normal[members])) or 1
-        near = free[np.abs((faces.centre[free] - point) @ normal) < gap]
+        near = candidates[np.abs((faces.centre[candidates] - point) @ normal) < gap]
         aligned = near[faces.normal[near] @ normal > np.cos(PARTS.tilt)]
-        members = faces.largest(aligned)
+        members = faces.largest(aligned, pairs)
         if not len(members):
             return None
     # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not be connected.
@@ -163,8 +172,8 @@ def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> 
 
 def _bounds(faces: _Faces, point: np.ndarray, normal: np.ndarray, gap: float) -> bool:
     """Whether (nearly) all of the mesh lies in front of a plane."""
-    inside = (faces.centre - point) @ normal > -gap
-    return bool(faces.area[inside].sum() >= PARTS.outer * faces.area.sum())
+    inside = faces.centre @ normal > point @ normal - gap
+    return bool(faces.area @ inside >= PARTS.outer * faces.area.sum())
 
 
 def _is_curved(faces: _Faces, members: np.ndarray, normal: np.ndarray) -> bool:
@@ -232,7 +241,8 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     """
     faces = _Faces(vertices, triangles)
     gap = plane_gap(vertices[triangles.ravel()])
-    planes = _planes(faces, gap, PARTS.plane, np.ones(faces.count, bool))
+    cell = _cells(faces, gap)
+    planes = _planes(faces, cell, gap, PARTS.plane, np.ones(faces.count, bool))
     label = np.full(faces.count, -1)
     for k, plane in enumerate(planes):
         label[plane.faces] = k
@@ -250,7 +260,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     ]
     small_planes = [
         replace(plane, part=int(np.bincount(part[plane.faces], faces.area[plane.faces]).argmax()))
-        for plane in _planes(faces, gap, PARTS.small, label < 0)
+        for plane in _planes(faces, cell, gap, PARTS.small, label < 0)
     ]
     names = {plane.part: plane.name for plane in named_planes if plane.name}
     return Parts(part, names, (*named_planes, *small_planes))
