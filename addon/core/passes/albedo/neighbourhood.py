@@ -111,6 +111,17 @@ def _prior(
     return prior
 
 
+def _is_even(normals: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Which of m places, each among the `neighbours` ((m, k) int) of n `normals` ((n, 3)), lie on an even surface."""
+    length = np.empty(len(neighbours), np.float32)
+
+    def measure(part: slice) -> None:
+        length[part] = np.linalg.norm(normals[neighbours[part]].mean(1), axis=1)
+
+    for_blocks(measure, len(neighbours), BLOCK, 0)
+    return length > np.cos(COPLANAR.turn)
+
+
 @dataclass(frozen=True)
 class References:
     """Well-measured elements of the parts of a scan that were told apart by shape alone.
@@ -202,8 +213,7 @@ def shrink(
     excess = offset**2 - (LEVELS.sigmas * error) ** 2
     variance = np.maximum(width**2, excess)
     # On an even surface E errs smoothly: what it errs by is its neighbours' too, and no reason to give up texture.
-    facing = atlas.normal[elements[sure]][prior.neighbours].mean(1)
-    even = (np.linalg.norm(facing, axis=1) > np.cos(COPLANAR.turn))[index, None]
+    even = _is_even(atlas.normal[elements[sure]], prior.neighbours)[index, None]
     of_all = 0 if shared is None else np.minimum(shared[todo, None], error)
     own = np.sqrt(error**2 - even * (1 - PRIOR.own**2) * of_all**2)
     trust = (variance / (variance + own**2)).astype(np.float32)
