@@ -166,6 +166,9 @@ def _cells_to_close(
     normals, ends = np.repeat([grid.plane.normal for grid in grids], counts, 0), np.cumsum(counts)[:-1]
     sight = sight_of([frame.camera for frame in frames], scene, points, normals, gap)
     closed = 2 * sight.through < np.maximum(sight.through + sight.out, 1)
+    # Past furniture one frame may see by its pose's error.
+    furniture = np.repeat([not grid.bounds for grid in grids], counts)
+    closed |= furniture & (sight.through + sight.out == 1)
     # Nobody looks outside through a floor: what is bright there is the sun on it.
     floor = np.repeat([grid.plane.name == "floor" for grid in grids], counts)
     looked_at = closed & (sight.out > 0) & ~floor
