@@ -1,4 +1,4 @@
-"""Holes of a mesh that was fused from depth, closed where evidence permits: its large planes are completed.
+"""Holes of a mesh that was fused from depth, closed where evidence permits: its planes are completed.
 
 The planes that bound the room (`shape_parts`) are continued to where they meet each other, other planes across the
 holes within them, and to the corners of the rectangle around them where frames show that they fill it. They are drawn

@@ -116,7 +116,11 @@ class _Faces:
         a, b = local_index[self.a[pairs]], local_index[self.b[pairs]]
         joined = (a >= 0) & (b >= 0)
         piece = components(a[joined], b[joined], len(chosen))
-        return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
+        return chosen[piece == self.most(piece, chosen)]
+
+    def most(self, label: np.ndarray, members: np.ndarray) -> int:
+        """The label that most of the area of the triangles `members` has; `label`, (m,) int, of each of them."""
+        return int(np.bincount(label, self.area[members]).argmax())
 
 
 def _cells(faces: _Faces, gap: float) -> np.ndarray:
@@ -248,7 +252,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
         label[plane.faces] = k
     x, y = label[faces.a], label[faces.b]
     piece = _without_crumbs(faces, faces.pieces(np.where((x >= 0) | (y >= 0), x == y, faces.smooth)))
-    piece_of_plane = [int(np.bincount(piece[plane.faces], faces.area[plane.faces]).argmax()) for plane in planes]
+    piece_of_plane = [faces.most(piece[plane.faces], plane.faces) for plane in planes]
     flat = np.zeros(piece.max() + 1, bool)
     flat[piece_of_plane] = True
     first = np.unique(piece, return_index=True)[1]  # a triangle of each piece, to find it again
@@ -259,7 +263,7 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
         for plane_piece, plane in zip(piece_of_plane, planes, strict=True)
     ]
     small_planes = [
-        replace(plane, part=int(np.bincount(part[plane.faces], faces.area[plane.faces]).argmax()))
+        replace(plane, part=faces.most(part[plane.faces], plane.faces))
         for plane in _planes(faces, cell, gap, PARTS.small, label < 0)
     ]
     names = {plane.part: plane.name for plane in named_planes if plane.name}
