@@ -19,7 +19,7 @@ def contributions(field: LightField, element: np.ndarray, groups: list[list[int]
     As by `direct` and `gather`, but that one trace over the hemisphere does for all. No object may be of two groups.
     """
     position, normal = field.atlas.position[element], field.atlas.normal[element]
-    rays, emitter_rays = LIGHT_FIT.rays, LIGHT_FIT.emitter_rays
+    rays, emitter_rays = LIGHT_FIT.rays, LIGHT_FIT.more_rays * LIGHT_FIT.emitter_rays
     E, density = np.zeros((len(element), len(groups))), np.zeros(len(field.mesh.triangles), np.float32)
     one_sided = np.zeros(len(density), bool)
     for k, objects in enumerate(groups):

@@ -49,12 +49,15 @@ class Unknown:
         Lower bounds of radiances and factor.
     expected : (k + s, 3) float64
         Radiances that the prior expects, and 1. As the sun was measured, its prior has the full weight.
+    any_level : (k + s,) bool, or one for all
+        Sources of which only the colour is expected: their level was taken from the same L_d, which would count twice.
     """
 
     contribution: np.ndarray
     by_sun: np.ndarray
     lower: np.ndarray
     expected: np.ndarray
+    any_level: np.ndarray | bool = False
 
     def irradiance(self, radiance: np.ndarray) -> np.ndarray:
         """E from all of them at radiances and a factor ((k + s, 3)), (m, 3) float64."""
@@ -65,7 +68,11 @@ class Unknown:
         """Some of them alone ((k + s,) bool)."""
         k = self.contribution.shape[1]
         return Unknown(
-            self.contribution[:, which[:k]], self.by_sun[:, which[k:]], self.lower[which], self.expected[which]
+            self.contribution[:, which[:k]],
+            self.by_sun[:, which[k:]],
+            self.lower[which],
+            self.expected[which],
+            np.broadcast_to(self.any_level, which.shape)[which],
         )
 
     def transposed(self, values: np.ndarray) -> np.ndarray:
@@ -116,6 +123,7 @@ class _NegativeLogPosterior:
         gradient = -self._unknown.transposed(grad_a / E) * radiance
         deviation = x - self.expected
         level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
+        level[np.broadcast_to(self._unknown.any_level, len(level))] = 0
         tint = (deviation - deviation.mean(1, keepdims=True)) / JOINT_FIT.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         value += float((self._weight * (np.log1p(level**2) + np.log(coloured))).sum())
@@ -144,7 +152,7 @@ def solve(
     """
     cost = _NegativeLogPosterior(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.lower, 1e-6))
-    start = cost.expected + np.log(JOINT_FIT.start)
+    start = cost.expected + np.broadcast_to(np.where(unknown.any_level, 0, np.log(JOINT_FIT.start)), len(low))[:, None]
     log_radiance = low  # of a closed mesh without clipped patches nothing is unknown
     if low.size:
         log_radiance = minimize(

@@ -1,6 +1,6 @@
 """All light of a room: lamps and sky, a sun, and what a mesh without objects lacks of it."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -49,7 +49,7 @@ class Search:
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None
     seed: int
     tilted: np.ndarray
-    shining: Collection[int]
+    shining: Mapping[int, np.ndarray]
     without: Collection[str]
     cameras: Sequence[Camera]
     patches: list[int] | None

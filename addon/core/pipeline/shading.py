@@ -1,8 +1,9 @@
 """The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def find_shading(
         surface = patches.surface(surface)
     capture = patches.capture(capture)
 
-    def shaded(lit_diffuse: LitDiffuse, shining: Collection[int] = ()) -> Shading:
+    def shaded(lit_diffuse: LitDiffuse, shining: Mapping[int, np.ndarray] = MappingProxyType({})) -> Shading:
         return shade(
             surface, capture.instances, lit_diffuse, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, shining=shining,
@@ -140,7 +141,7 @@ def shade(
     *,
     progress: Progress | None = None,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
-    shining: Collection[int] = (),
+    shining: Mapping[int, np.ndarray] = MappingProxyType({}),
     patches: list[int] | None = None,
     whole: np.ndarray | None = None,
     cameras: Sequence[Camera] = (),
@@ -152,8 +153,8 @@ def shade(
     find_mirrors : callable, optional
         Finds the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
         again with them.
-    shining : collection of int
-        Objects that frames show clipped, of which `lit_diffuse` holds nothing.
+    shining : mapping of int to (3,) float64
+        Objects that frames show clipped, of which `lit_diffuse` holds nothing, and the radiance that they clip at.
     patches : list of int, optional
         Objects that were set apart as they were clipped; None where the capture names its objects.
     whole : (n,) int, optional

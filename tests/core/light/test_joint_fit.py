@@ -1,5 +1,7 @@
 """Unknown sources solved for together, by what albedo is plausible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,19 @@ def test_any_unit_of_radiance_does():
         unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), float(unit)))
         (found,), _ = solve(unit * sent, np.full((m, 3), float(unit)), unknown, pairs)
         assert found == pytest.approx(20 * unit, rel=0.1)
+
+
+def test_a_source_of_any_level_is_not_drawn_to_the_one_expected():
+    rng, m = np.random.default_rng(2), 500
+    through = rng.uniform(0, 0.002, (m, 1))
+    sent = 0.5 / np.pi * (1 + 20 * through) * np.ones(3) * np.exp(rng.normal(0, 0.1, (m, 1)))
+    unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), 6.0))
+    pairs = rng.integers(0, m, (8 * m, 2))
+    drawn, free = (
+        float(solve(sent, np.ones((m, 3)), replace(unknown, any_level=any_level), pairs)[0].mean())
+        for any_level in (False, True)
+    )
+    assert drawn < 0.6 * 20 and free > 1.2 * drawn
 
 
 def test_green_where_the_sun_throws_most_light_is_paint():

@@ -4,7 +4,7 @@ A clipped lamp lights the room with more than its pixels show. So it is solved f
 lamp that no frame looked at is (`unseen_light`); where that fails, the bound is used and said to be one.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +15,8 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 
 
-def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) -> dict[int, float]:
-    """Objects of which most frames show most clipped, with the luminance that they have at least; none of `but`.
+def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) -> dict[int, np.ndarray]:
+    """Objects of which most frames show most clipped, with the radiance that they have at least, (3,); none of `but`.
 
     Not by the tier: where poses are off, a few pixels of an edge reach far into a lamp that all others show clipped.
     """
@@ -27,7 +27,7 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) ->
         elements = elements[lit.seen[elements]]
         clipped = elements[mostly_clipped[elements]]
         if 2 * atlas.area[clipped].sum() > atlas.area[elements].sum():
-            bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
+            bounds[int(object_id)] = np.median(lit.radiance[clipped], 0).astype(np.float64)
     return bounds
 
 
@@ -42,14 +42,17 @@ def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
 
 
 def shade_clipped(
-    shade: Callable[[LitDiffuse, Collection[int]], Shading], lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()
+    shade: Callable[[LitDiffuse, Mapping[int, np.ndarray]], Shading],
+    lit: LitDiffuse,
+    atlas: Atlas,
+    but: Collection[int] = (),
 ) -> Shading:
     """`shade(lit)`, with clipped lamps solved for.
 
     Parameters
     ----------
     shade : callable
-        Gives a Shading for an L_d, and objects that count in it as unseen though they shine.
+        Gives a Shading for an L_d, and objects that count in it as unseen though they shine, with at least a radiance.
     but : collection of int
         Objects that are left to `shade`.
 
@@ -60,16 +63,17 @@ def shade_clipped(
     """
     bounds = clipped_objects(lit, atlas, but)
     if not bounds:
-        return shade(lit, ())
+        return shade(lit, {})
     shading = shade(unseen(lit, atlas, list(bounds)), bounds)
     solved = {
         lamp.object_id for lamp in shading.lamps
-        if lamp.object_id in bounds and float(lamp.radiance @ LUMINANCE) >= bounds[lamp.object_id]
+        if lamp.object_id in bounds and float((lamp.radiance - bounds[lamp.object_id]) @ LUMINANCE) >= 0
     }  # fmt: skip
     if len(solved) < len(bounds):
         # Once more, as the first run had nothing where those that were not solved for are: their bound lights the
         # others, and has to be there when these are solved for. Where all were solved, the first run stands.
-        shading = shade(unseen(lit, atlas, list(solved)) if solved else lit, solved)
+        shining = {object_id: bounds[object_id] for object_id in solved}
+        shading = shade(unseen(lit, atlas, list(solved)) if solved else lit, shining)
 
     return replace(
         shading, lamps=tuple(replace(lamp, clipped=lamp.clipped or lamp.object_id in bounds) for lamp in shading.lamps)

@@ -1,6 +1,6 @@
 """Lamps that nobody saw shine, found one by one from what they throw, and the sky beside them."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -125,12 +125,20 @@ def _tells(sky: Sky, i: int, others: np.ndarray) -> bool:
 
 
 def solve_together(
-    sample: Sample, atlas: Atlas, lamps: list[Lamp], contribution, sky: Sky, base: np.ndarray, seed: int
+    sample: Sample,
+    atlas: Atlas,
+    lamps: list[Lamp],
+    contribution,
+    sky: Sky,
+    base: np.ndarray,
+    bounds: Mapping[int, np.ndarray],
+    seed: int,
 ) -> list[Lamp]:
     """Lamps, and in place the sky, solved for once more by what albedo is plausible (`joint_fit`).
 
     By the spread within objects alone they come out too dark where most of the light is unknown. A lamp that shines as
-    a seen one does keeps its radiance.
+    a seen one does keeps its radiance. One that the sensor clipped is no darker than that (`bounds`, (3,) each), and
+    likely of that colour, which is about the white that a camera balances for.
     """
     free = [lamp for lamp in lamps if lamp.twin is None]
     kept = [lamp for lamp in lamps if lamp.twin is not None]
@@ -138,22 +146,30 @@ def solve_together(
     parts = [i for i in range(len(sky.contribution)) if _tells(sky, i, light)]
     if not free and not parts:
         return lamps
-    bounds = [sky.bounds(i) for i in parts]
+    of_sky = [sky.bounds(i) for i in parts]
     by_white = np.stack([*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], 1)
     unknown = Unknown(
         by_white,
         np.zeros((len(base), 0, 3)),
-        np.stack([*(np.zeros(3) for _ in free), *(low for low, _ in bounds)]),
-        np.stack([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)]),
+        np.stack([*(bounds.get(lamp.object_id, np.zeros(3)) for lamp in free), *(low for low, _ in of_sky)]),
+        np.stack([*(_like_its_bound(lamp, bounds) for lamp in free), *(sky.radiance[i] for i in parts)]),
+        np.arange(len(free) + len(parts)) < len(free),
     )
     known = all_light(base, kept, contribution, sky.without(parts))
     position, normal = atlas.position[sample.element], atlas.normal[sample.element]
     radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed))
     solved = [replace(lamp, radiance=s.astype(np.float32)) for lamp, s in zip(free, radiance[: len(free)], strict=True)]
-    for i, (low, high), s in zip(parts, bounds, radiance[len(free) :], strict=True):
+    for i, (low, high), s in zip(parts, of_sky, radiance[len(free) :], strict=True):
         sky.radiance[i] = np.clip(s, low, high)
         sky.solved.add(i)
     return solved + kept
+
+
+def _like_its_bound(lamp: Lamp, bounds: Mapping[int, np.ndarray]) -> np.ndarray:
+    """A lamp's luminance, in the colour of its lower bound where it has one, (3,)."""
+    if (bound := bounds.get(lamp.object_id)) is None:
+        return lamp.radiance
+    return bound * max(float(lamp.radiance @ LUMINANCE) / max(float(bound @ LUMINANCE), 1e-12), 1.0)
 
 
 def _best_radiance(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:

@@ -5,8 +5,9 @@ an object, light a lot: the radiance under which albedo varies least is the one 
 by one.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def find_light(
     kinds: LampKinds,
     seed: int = 0,
     tilted: np.ndarray | None = None,
-    shining: Collection[int] = (),
+    shining: Mapping[int, np.ndarray] = MappingProxyType({}),
     before: Light | None = None,
     without: Collection[str] = (),
 ) -> Light:
@@ -106,8 +107,8 @@ def find_light(
         Objects of which no frame saw anything.
     tilted : (n,) float, optional
         Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
-    shining : collection of int
-        Of the unseen objects, those that surely are lamps.
+    shining : mapping of int to (3,) float64
+        Of the unseen objects, those that surely are lamps, and the radiance that each has at least.
     before : Light, optional
         What was found in the same room without its sun, or of its mixed lamps.
     """
@@ -184,13 +185,17 @@ def find_light(
         lit_room = field.with_light(room_radiance, environment)
         min_luminance = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
 
-    certain = {i for i, group in groups.items() if not set(group).isdisjoint(shining)}
+    certain = {
+        i: np.median([shining[k] for k in group if k in shining], 0)
+        for i, group in groups.items()
+        if not set(group).isdisjoint(shining)
+    }
     for _ in range(UNSEEN.sweeps if zones else 1):
         lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received)
         solve_sky(sample, lamps, contribution, sky, received)
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
     if "plausible-light" not in without and (certain or any(sky.clipped)):
-        lamps = solve_together(sample, atlas, lamps, contribution, sky, received, seed)
+        lamps = solve_together(sample, atlas, lamps, contribution, sky, received, certain, seed)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps

@@ -5,6 +5,7 @@ import pytest
 
 from addon.core.light.lamps import Lamp
 from addon.core.light.light_fit import Sample
+from addon.core.luminance import LUMINANCE
 from addon.core.passes.unseen_light.sky import Sky
 from addon.core.passes.unseen_light.unseen_lamps import solve_together
 from tests.core.rooms import make_room, quad
@@ -12,12 +13,14 @@ from tests.core.rooms import make_room, quad
 LAMP, SKY, TWIN = np.array([9.0, 7.0, 5.0]), np.array([2.0, 2.2, 2.6]), np.full(3, 6.0)
 
 
-def solved(told: float, share: float = 0.5, lower: float = 0.1) -> tuple[list[Lamp], Sky]:
+def solved(
+    told: float, share: float = 0.5, lower: float = 0.1, by_lamp: float = 0.5, clipped_at: np.ndarray | None = None
+) -> tuple[list[Lamp], Sky]:
     """A floor of two paints under a lamp, one like a seen one, and a part of the sky; the first and last `told`."""
     room = make_room([quad((0, 0, 0), (4, 0, 0), (0, 3, 0), 0)], 0.1)
     x, y = room.atlas.position[:, 0], room.atlas.position[:, 1]
     m, rng = len(x), np.random.default_rng(3)
-    base, at_lamp, at_twin = np.full((m, 3), 1.0), 0.5 * (x < 1.5), 0.2 * (x > 2.5)
+    base, at_lamp, at_twin = np.full((m, 3), 1.0), by_lamp * (x < 1.5), 0.2 * (x > 2.5)
     at_sky = share * (y < 1)
     E = base + at_lamp[:, None] * LAMP + at_twin[:, None] * TWIN + at_sky[:, None] * SKY
     albedo = np.where(((x // 0.5 + y // 0.5) % 2)[:, None] > 0, 0.3, 0.6) * np.exp(rng.normal(0, 0.03, (m, 1)))
@@ -25,7 +28,8 @@ def solved(told: float, share: float = 0.5, lower: float = 0.1) -> tuple[list[La
     lamps = [Lamp(1, told * LAMP, False), Lamp(2, TWIN, False, twin=5)]
     sky = Sky([at_sky], [lower * SKY], [True], [True])
     sky.radiance = [np.maximum(told, lower) * SKY]
-    return solve_together(sample, room.atlas, lamps, {1: at_lamp, 2: at_twin}, sky, base, 0), sky
+    bounds = {} if clipped_at is None else {1: clipped_at}
+    return solve_together(sample, room.atlas, lamps, {1: at_lamp, 2: at_twin}, sky, base, bounds, 0), sky
 
 
 @pytest.mark.parametrize("told", [0.6, 1.0, 1.6])
@@ -34,6 +38,16 @@ def test_they_come_nearer_to_the_truth(told):
     by_id = {lamp.object_id: lamp.radiance for lamp in lamps}
     assert by_id[1] == pytest.approx(LAMP, rel=0.15) and sky.radiance[0] == pytest.approx(SKY, rel=0.15)
     assert by_id[2].tolist() == TWIN.tolist() and sky.solved == {0}
+
+
+def test_a_clipped_lamp_is_no_darker_than_it_was_seen():
+    lamps, _ = solved(1.0, clipped_at=1.5 * LAMP)
+    assert (lamps[0].radiance >= 1.5 * LAMP * (1 - 1e-6)).all()
+
+
+def test_a_clipped_lamp_that_lights_next_to_nothing_has_the_colour_at_which_it_was_clipped():
+    lamps, _ = solved(1.0, by_lamp=1e-5, clipped_at=np.ones(3))
+    assert lamps[0].radiance == pytest.approx(np.full(3, LUMINANCE @ LAMP), rel=0.05)
 
 
 def test_a_clipped_sky_is_no_darker_than_it_was_seen():
@@ -50,5 +64,5 @@ def test_where_nothing_is_unknown_all_stays():
     sample = Sample(np.arange(4), np.zeros(4, int), np.ones((4, 3)), np.ones((4, 3)))
     twin, sky = Lamp(2, TWIN, False, twin=5), Sky([], [], [], [])
     room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0)], 0.5)
-    assert solve_together(sample, room.atlas, [twin], {2: np.ones(4)}, sky, np.ones((4, 3)), 0) == [twin]
+    assert solve_together(sample, room.atlas, [twin], {2: np.ones(4)}, sky, np.ones((4, 3)), {}, 0) == [twin]
     assert not sky.solved
