@@ -13,13 +13,16 @@ from .over_mirrors import direct_over_mirrors
 from .params import LIGHT_FIT
 
 
-def contributions(field: LightField, element: np.ndarray, groups: list[list[int]], seed: int) -> np.ndarray:
+def contributions(
+    field: LightField, element: np.ndarray, groups: list[list[int]], seed: int, more: int = 1
+) -> np.ndarray:
     """E at m elements from each of g groups of objects at radiance 1 and nothing else, (m, g) float64.
 
-    As by `direct` and `gather`, but that one trace over the hemisphere does for all. No object may be of two groups.
+    As by `direct` and `gather`, but that one trace over the hemisphere does for all, with `more` times the rays aimed
+    at the groups. No object may be of two groups.
     """
     position, normal = field.atlas.position[element], field.atlas.normal[element]
-    rays, emitter_rays = LIGHT_FIT.rays, LIGHT_FIT.more_rays * LIGHT_FIT.emitter_rays
+    rays, emitter_rays = LIGHT_FIT.rays, more * LIGHT_FIT.emitter_rays
     E, density = np.zeros((len(element), len(groups))), np.zeros(len(field.mesh.triangles), np.float32)
     one_sided = np.zeros(len(density), bool)
     for k, objects in enumerate(groups):

@@ -178,9 +178,9 @@ def find_light(
     if earlier is not None:
         contribution, min_luminance = earlier.lamps, earlier.min_luminance
     else:
-        contribution = dict(
-            zip(groups, contributions(field, sample.element, list(groups.values()), seed).T, strict=True)
-        )
+        more = LIGHT_FIT.more_rays if shining else 1
+        by_group = contributions(field, sample.element, list(groups.values()), seed, more)
+        contribution = dict(zip(groups, by_group.T, strict=True))
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(room_radiance, environment)
         min_luminance = {i: most_reflected(lit_room, group, seed) for i, group in groups.items()}
