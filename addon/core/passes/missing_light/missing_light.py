@@ -16,7 +16,7 @@ from ...light.field import LightField
 from ...light.joint_fit import Unknown, in_one_plane, solve_for_some
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
-from ...light.params import GATHER, LIGHT_FIT
+from ...light.params import GATHER
 from ...luminance import LUMINANCE
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
@@ -142,7 +142,7 @@ def find_missing_light(
     part = sky.clipped_parts(MISSING.sky)
     cell, through, from_sky, by_part = _through_cells(field, part, shut, windows, element, seed)
     received = received + from_sky
-    by_patch = contributions(field, element, [[patch] for patch in patches], seed, LIGHT_FIT.more_rays)
+    by_patch = contributions(field, element, [[patch] for patch in patches], seed)
     lamp_of = same_lamps(atlas, masks)
     daylight = _daylight(np.median(radiance[element], 0).astype(np.float64))
     # What hardly any element sees says nothing, and lights nothing.
