@@ -92,6 +92,7 @@ class _NegativeLogPosterior:
         self._difference_transposed = self._difference.T.tocsr()
         self.expected = np.log(np.maximum(unknown.expected, 1e-6))
         k, channels = self.expected.shape
+        self.any_level = np.broadcast_to(unknown.any_level, k)
         self._weight = np.full((k, 1), JOINT_FIT.sources * channels / max(k, 1))
         self._weight[unknown.contribution.shape[1] :] = JOINT_FIT.sources * channels
 
@@ -123,7 +124,7 @@ class _NegativeLogPosterior:
         gradient = -self._unknown.transposed(grad_a / E) * radiance
         deviation = x - self.expected
         level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
-        level[np.broadcast_to(self._unknown.any_level, len(level))] = 0
+        level[self.any_level] = 0
         tint = (deviation - deviation.mean(1, keepdims=True)) / JOINT_FIT.tint
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         value += float((self._weight * (np.log1p(level**2) + np.log(coloured))).sum())
@@ -152,7 +153,7 @@ def solve(
     """
     cost = _NegativeLogPosterior(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.lower, 1e-6))
-    start = cost.expected + np.broadcast_to(np.where(unknown.any_level, 0, np.log(JOINT_FIT.start)), len(low))[:, None]
+    start = cost.expected + np.where(cost.any_level, 0, np.log(JOINT_FIT.start))[:, None]
     log_radiance = low  # of a closed mesh without clipped patches nothing is unknown
     if low.size:
         log_radiance = minimize(

@@ -85,7 +85,7 @@ def find_shading(
         surface = patches.surface(surface)
     capture = patches.capture(capture)
 
-    def shaded(lit_diffuse: LitDiffuse, shining: Mapping[int, np.ndarray] = MappingProxyType({})) -> Shading:
+    def shaded(lit_diffuse: LitDiffuse, shining: Mapping[int, np.ndarray]) -> Shading:
         return shade(
             surface, capture.instances, lit_diffuse, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, shining=shining,
@@ -93,7 +93,7 @@ def find_shading(
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
-        shading = shaded(lit_diffuse)
+        shading = shaded(lit_diffuse, {})
     else:
         # What else is clipped where patches were set apart is lit, as a sofa in the sun: solving for it is in vain.
         no_lamps = [instance.object_id for instance in capture.instances] if set_apart else []

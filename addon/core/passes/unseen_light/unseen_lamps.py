@@ -91,8 +91,12 @@ def _coloured(object_id, s, before, after, class_of, same, seen, received, by_ch
         if abs(float(colour @ LUMINANCE) / s - 1) < LIGHT_FIT.alike:
             return Lamp(int(object_id), colour, False, spread=spread)
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
-    radiance = (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32)
-    return Lamp(int(object_id), radiance, False, spread=spread)
+    return Lamp(int(object_id), _of_colour(s, white).astype(np.float32), False, spread=spread)
+
+
+def _of_colour(luminance: float, colour: np.ndarray) -> np.ndarray:
+    """The radiance of a luminance that has the colour of another radiance, (3,)."""
+    return luminance * colour / max(float(colour @ LUMINANCE), 1e-12)
 
 
 def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
@@ -169,7 +173,7 @@ def _like_its_bound(lamp: Lamp, bounds: Mapping[int, np.ndarray]) -> np.ndarray:
     """A lamp's luminance, in the colour of its lower bound where it has one, (3,)."""
     if (bound := bounds.get(lamp.object_id)) is None:
         return lamp.radiance
-    return bound * max(float(lamp.radiance @ LUMINANCE) / max(float(bound @ LUMINANCE), 1e-12), 1.0)
+    return _of_colour(max(float(lamp.radiance @ LUMINANCE), float(bound @ LUMINANCE)), bound)
 
 
 def _best_radiance(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:
