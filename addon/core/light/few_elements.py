@@ -8,6 +8,7 @@ from ..luminance import LUMINANCE
 from ..parallel import for_blocks
 from ..significance import LEVELS
 from .emitters import bright_triangles
+from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
 from .params import GATHER, LIGHT_FIT
@@ -100,6 +101,20 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     if field.sun is None:
         return np.zeros((len(element), 3), np.float32)
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
+
+
+def by_sun(
+    field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int, more: int = 1
+) -> np.ndarray:
+    """E at m elements by the sun and by the `radiance` that it makes `sunlit` elements ((n,) bool) send, (m, 1, 3).
+
+    float64; (m, 0, 3) where there are none of these.
+    """
+    if not sunlit.any():
+        return np.zeros((len(element), 0, 3))
+    reflected = np.where(sunlit[:, None], radiance, 0).astype(np.float32)
+    alone = field.with_openings(None).with_light(reflected, Environment.dark())
+    return irradiance_at(alone, element, seed, more)[:, None]
 
 
 def most_reflected(field: LightField, objects: list[int], seed: int) -> float:

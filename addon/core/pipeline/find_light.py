@@ -18,7 +18,7 @@ from ..passes.missing_light.missing_light import MissingLight, find_missing_ligh
 from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
-from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
+from ..passes.unseen_light.unseen_light import Light, find_light, lit_by, with_sunlight
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera
 from ..scene.params import VISIBILITY
@@ -97,16 +97,17 @@ def with_all_light(search: Search) -> tuple[LightField, Light, np.ndarray]:
             return found
     sun = dark.sun
     if sun is None and len(light.received) and "sun" not in without:
-        light, sun = with_sun_found(
-            light.without_mixed(field), light, find, good, lit_diffuse.clipped > 0.5, search.seed
-        )
+        light, dark = with_sun_found(search, light.without_mixed(field), light, find, good)
+        sun = dark.sun
     return lit(light, sun), light, np.zeros(len(atlas), bool)
 
 
 def with_sun_found(
-    unmixed: LightField, light: Light, find: Callable[..., Light], good: np.ndarray, clipped: np.ndarray, seed: int
-) -> tuple[Light, Sun | None]:
+    search: Search, unmixed: LightField, light: Light, find: Callable[..., Light], good: np.ndarray
+) -> tuple[Light, LightField]:
     """A sun that no frame shows, and lamps and sky under it; without one `light` as it is, to the last bit.
+
+    And the room as frames show it, with that sun and what it makes clipped surfaces send.
 
     Parameters
     ----------
@@ -116,27 +117,34 @@ def with_sun_found(
         `find_light` of a field, with all that is the same for each.
     good : (n,) bool
         As in `find_light`.
-    clipped : (n,) bool
-        Elements that most frames show clipped.
     """
+    dark, seed, lit_diffuse = search.dark, search.seed, search.lit_diffuse
     object_id, lamps = unmixed.atlas.object_id, [lamp.object_id for lamp in light.lamps]
     lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
     unlit = ~np.isin(object_id, lamps)
-    free = unlit[light.element]
+    free, clipped = unlit[light.element], lit_diffuse.seen & (lit_diffuse.clipped > 0.5)
     sun_fit = find_sun(
         unmixed, light.element[free], light.received[free], good & unlit,
         lambda element: irradiance_at(lit_field, element, seed), object_id, clipped, seed,
     )  # fmt: skip
     if sun_fit is None:
-        return light, None
-    lit_by_sun = unmixed.with_sun(sun_fit.sun)
+        return light, dark
+    lit_by_sun, dark = unmixed.with_sun(sun_fit.sun), dark.with_sun(sun_fit.sun)
+    sunlit = np.zeros(len(clipped), bool)
+    if "clipped-sunlight" not in search.without:
+        sent = with_clipped_sunlight(lit_by_sun, clipped & unlit, light.element[free], light.received[free], object_id)
+        sunlit = (sent > lit_by_sun.radiance).any(1)
+    if sunlit.any():
+        light_with_sun = find(lit_by_sun.with_light(sent), before=light, good=good & ~sunlit, sunlit=sunlit)
+        dark = dark.with_light(np.where(sunlit[:, None], sent, dark.radiance))
+        return light_with_sun, with_sunlight(dark, sunlit, light_with_sun.sun)
     light_with_sun = find(lit_by_sun, before=light)
     if not len(light_with_sun.received):
-        return light_with_sun, sun_fit.sun
+        return light_with_sun, dark
     # Lamps and sky that stood in for the sun no longer do, so its strength is solved for again beside them.
     others = light_with_sun.received - from_sun(lit_by_sun, light.element)
     factor = np.maximum(others, 0) / np.maximum(light.received, 1e-12)
-    return light_with_sun, sun_fit.under(factor[free])
+    return light_with_sun, dark.with_sun(sun_fit.under(factor[free]))
 
 
 def with_missing_light(

@@ -11,7 +11,7 @@ import numpy as np
 from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import filled_radiance, from_sun, irradiance_at, spread_over
+from ...light.few_elements import by_sun, filled_radiance, from_sun, irradiance_at, spread_over
 from ...light.field import LightField
 from ...light.joint_fit import Unknown, in_one_plane, solve_for_some
 from ...light.lamps import Lamp, find_seen
@@ -134,7 +134,7 @@ def find_missing_light(
     sunlit = np.zeros(len(atlas), bool) if sunlit is None else sunlit
     hidden = np.isin(atlas.object_id, patches) | shut | sunlit
     element = spread_over(field, np.flatnonzero(good & ~hidden), LEVELS.sample, np.random.default_rng(seed))
-    by_sun = _by_sun(field, radiance, sunlit, element, seed)
+    of_factor = by_sun(field, radiance, sunlit, element, seed)
     radiance[hidden] = 0
     lit_by_known = field.with_openings(None).with_light(radiance, Environment.dark())
     received = irradiance_at(lit_by_known.with_sun(None) if sunlit.any() else lit_by_known, element, seed)
@@ -156,10 +156,10 @@ def find_missing_light(
     patch_bounds = np.reshape([np.median(bounds[w > 0] / w[w > 0, None], 0) for w in lamp_of.T], (-1, 3))
     lower_bounds, cells = np.concatenate([patch_bounds, level[usable_parts]]), int(usable_cells.sum())
     by_white = np.concatenate([by_patch @ lamp_of, by_part[:, usable_parts], through[:, usable_cells]], 1)
-    sources, of_sun = by_white.shape[1], np.ones((by_sun.shape[1], 3))
+    sources, of_sun = by_white.shape[1], np.ones((of_factor.shape[1], 3))
     unknown = Unknown(
         by_white,
-        by_sun,
+        of_factor,
         np.concatenate([lower_bounds, np.full((cells, 3), 1e-6), 1e-6 * of_sun]),
         np.concatenate([patch_bounds, _daylight(level[usable_parts]), np.tile(daylight, (cells, 1)), of_sun]),
     )
@@ -209,15 +209,6 @@ def _prominent(contribution: np.ndarray, radiance: np.ndarray, irradiance: np.nd
     """Which of k sources ((m, k), (k, 3)) give a tenth of all E ((m, 3)) at many of the m elements, (k,) bool."""
     share = contribution * (radiance @ LUMINANCE) / (irradiance @ LUMINANCE)[:, None]
     return (share > LEVELS.gain).sum(0) >= LEVELS.many
-
-
-def _by_sun(field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
-    """E at m elements from the sun and from what it makes `sunlit` elements send, (m, 1, 3) float64; else (m, 0, 3)."""
-    if not sunlit.any():
-        return np.zeros((len(element), 0, 3))
-    reflected = np.where(sunlit[:, None], radiance, 0).astype(np.float32)
-    alone = field.with_openings(None).with_light(reflected, Environment.dark())
-    return irradiance_at(alone, element, seed)[:, None]
 
 
 def _daylight(radiance: np.ndarray) -> np.ndarray:

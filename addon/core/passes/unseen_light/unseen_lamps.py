@@ -136,8 +136,9 @@ def solve_together(
     sky: Sky,
     base: np.ndarray,
     bounds: Mapping[int, np.ndarray],
+    by_sun: np.ndarray,
     seed: int,
-) -> list[Lamp]:
+) -> tuple[list[Lamp], np.ndarray]:
     """Lamps, and in place the sky, solved for once more by what albedo is plausible (`joint_fit`).
 
     By the spread within objects alone they come out too dark where most of the light is unknown. A lamp that shines as
@@ -148,25 +149,29 @@ def solve_together(
     kept = [lamp for lamp in lamps if lamp.twin is not None]
     light = all_light(base, lamps, contribution, sky)
     parts = [i for i in range(len(sky.contribution)) if _tells(sky, i, light)]
-    if not free and not parts:
-        return lamps
+    suns = by_sun.shape[1]
+    if not free and not parts and not suns:
+        return lamps, np.ones(3)
     of_sky = [sky.bounds(i) for i in parts]
-    by_white = np.stack([*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], 1)
+    by_white = np.reshape(
+        [*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], (-1, len(base))
+    ).T
+    of_sun = np.ones((suns, 3))
     unknown = Unknown(
         by_white,
-        np.zeros((len(base), 0, 3)),
-        np.stack([*(bounds.get(lamp.object_id, np.zeros(3)) for lamp in free), *(low for low, _ in of_sky)]),
-        np.stack([*(_like_its_bound(lamp, bounds) for lamp in free), *(sky.radiance[i] for i in parts)]),
-        np.arange(len(free) + len(parts)) < len(free),
+        by_sun,
+        np.stack([*(bounds.get(lamp.object_id, np.zeros(3)) for lamp in free), *(low for low, _ in of_sky), *of_sun]),
+        np.stack([*(_like_its_bound(lamp, bounds) for lamp in free), *(sky.radiance[i] for i in parts), *of_sun]),
+        np.array([True] * len(free) + [False] * len(parts) + [True] * suns),
     )
-    known = all_light(base, kept, contribution, sky.without(parts))
+    known = all_light(base, kept, contribution, sky.without(parts)) - by_sun.sum(1)
     position, normal = atlas.position[sample.element], atlas.normal[sample.element]
     radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed))
     solved = [replace(lamp, radiance=s.astype(np.float32)) for lamp, s in zip(free, radiance[: len(free)], strict=True)]
-    for i, (low, high), s in zip(parts, of_sky, radiance[len(free) :], strict=True):
+    for i, (low, high), s in zip(parts, of_sky, radiance[len(free) : len(free) + len(parts)], strict=True):
         sky.radiance[i] = np.clip(s, low, high)
         sky.solved.add(i)
-    return solved + kept
+    return solved + kept, radiance[-1] if suns else np.ones(3)
 
 
 def _like_its_bound(lamp: Lamp, bounds: Mapping[int, np.ndarray]) -> np.ndarray:

@@ -6,14 +6,23 @@ by one.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
-from ...light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, most_reflected, pick, steady
+from ...light.few_elements import (
+    barely_seen,
+    by_sun,
+    filled_radiance,
+    from_sun,
+    irradiance_at,
+    most_reflected,
+    pick,
+    steady,
+)
 from ...light.field import LightField
 from ...light.lamps import Lamp, LampKinds, find_seen, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
@@ -67,6 +76,8 @@ class Light:
         E there by all of this light.
     mixed : tuple of int
         Lamps that frames show, but mixed with what is beside them (`mixed_lamps`): solved for as if unseen.
+    sun : (3,) float64
+        Times the irradiance of the field's sun: the light that it throws asks for that.
     """
 
     lamps: tuple[Lamp, ...]
@@ -76,6 +87,7 @@ class Light:
     received: np.ndarray
     contribution: Contributions | None = None
     mixed: tuple[int, ...] = ()
+    sun: np.ndarray = field(default_factory=lambda: np.ones(3))
 
     def without_mixed(self, field: LightField) -> LightField:
         """The field with lamps dark that frames show only mixed."""
@@ -93,6 +105,7 @@ def find_light(
     shining: Mapping[int, np.ndarray] = MappingProxyType({}),
     before: Light | None = None,
     without: Collection[str] = (),
+    sunlit: np.ndarray | None = None,
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -111,7 +124,10 @@ def find_light(
         Of the unseen objects, those that surely are lamps, and the radiance that each has at least.
     before : Light, optional
         What was found in the same room without its sun, or of its mixed lamps.
+    sunlit : (n,) bool, optional
+        Elements that send more than frames show, as the field's sun is on them. That is solved for with all the rest.
     """
+    sunlit = np.zeros(len(field.atlas), bool) if sunlit is None else sunlit
     original, mixed = field, before.mixed if before is not None else ()
     if before is not None:
         field, unseen_objects = before.without_mixed(field), [*unseen_objects, *mixed]
@@ -124,7 +140,7 @@ def find_light(
     element = pick(field, usable, seed, LEVELS.sample)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)), mixed=mixed)
-    previous = before.contribution if before is not None and field.environment.seen else None
+    previous = before.contribution if before is not None and field.environment.seen and not sunlit.any() else None
     field, sky_notes = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     solve_zones = environment.seen and "unseen-sky" not in without
@@ -133,16 +149,18 @@ def find_light(
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
     dark, room_radiance, unlit = np.zeros_like(field.radiance), filled_radiance(field), field.with_sun(None)
-    lights = [unlit.with_light(room_radiance, known)]
+    in_shade = np.where(sunlit[:, None], np.float32(0), room_radiance)
+    lights = [unlit.with_light(in_shade, known)]
     lights += [unlit.with_light(dark, Environment.only(zone.pattern)) for zone in zones]
     if previous:
         sunless, sky_contributions = previous.received.copy(), [G.copy() for G in previous.sky]
     else:
         sunless, *by_sky = (irradiance_at(light, element, seed) for light in lights)
         sky_contributions = [G[:, 0] for G in by_sky]
-    sunlit = from_sun(field, element)
+    by_factor = by_sun(field, room_radiance, sunlit, element, seed, LIGHT_FIT.more_rays)
+    sunlight = by_factor.sum(1) if sunlit.any() else from_sun(field, element)
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
-    filled = sunless + sunlit + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
+    filled = sunless + sunlight + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = bright_all_over(field, element, filled)
     if before is None and "unseen-lamps" not in without:
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
@@ -160,7 +178,7 @@ def find_light(
         sunless[lit] = irradiance_at(lights[0], tells, seed, LIGHT_FIT.more_rays)
         for G, light in zip(sky_contributions, lights[1:], strict=True):
             G[lit] = irradiance_at(light, tells, seed, LIGHT_FIT.more_rays)[:, 0]
-    received = (sunless + sunlit)[lit]
+    received = (sunless + sunlight)[lit]
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.measured for z in zones])
     sent = field.radiance[tells].astype(np.float64)
     sample = Sample(tells, atlas.object_id[tells], sent, all_light(received, [], {}, sky))
@@ -194,8 +212,9 @@ def find_light(
         lamps = solve_lamps(sample, contribution, min_luminance, kinds, kin, seen, sky, received)
         solve_sky(sample, lamps, contribution, sky, received)
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
-    if "plausible-light" not in without and (certain or any(sky.clipped)):
-        lamps = solve_together(sample, atlas, lamps, contribution, sky, received, certain, seed)
+    sun = np.ones(3)
+    if "plausible-light" not in without and (certain or any(sky.clipped) or sunlit.any()):
+        lamps, sun = solve_together(sample, atlas, lamps, contribution, sky, received, certain, by_factor[lit], seed)
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps
@@ -205,13 +224,22 @@ def find_light(
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
+    if sunlit.any():
+        field = with_sunlight(field, sunlit, sun)
     irradiance = irradiance_at(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = bright_all_over(field, element, irradiance)
     reusable = Contributions(sunless, sky_contributions, sample.element, contribution, min_luminance)
     notes = sky_notes + tuple(sky.notes())
-    return Light(tuple(sure) + tuple(lamps), environment, notes, element, irradiance, reusable, mixed)
+    return Light(tuple(sure) + tuple(lamps), environment, notes, element, irradiance, reusable, mixed, sun)
+
+
+def with_sunlight(field: LightField, sunlit: np.ndarray, factor: np.ndarray) -> LightField:
+    """The field with its sun, and what it makes `sunlit` elements send, so many times as bright ((3,))."""
+    assert field.sun is not None
+    radiance = np.where(sunlit[:, None], field.radiance * np.float32(factor), field.radiance)
+    return field.with_sun(replace(field.sun, irradiance=field.sun.irradiance * np.float32(factor))).with_light(radiance)
 
 
 def bright_all_over(field: LightField, element: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:

@@ -380,3 +380,24 @@ def test_a_clipped_patch_sends_what_it_reflects_of_the_sun(room):
     element = element[room.atlas.object_id[element] != 0]  # nothing tells the floor's albedo
     bound = with_clipped_sunlight(field, clipped, element, (E - sun_E)[element], room.atlas.object_id)
     assert np.array_equal(bound[patch], lit.radiance[patch])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.4])
+def test_a_sun_whose_patch_is_clipped_is_as_strong_as_what_the_patch_reflects_into_the_room_tells(room, share):
+    """Its level, a share of what it sends, tells only as much of the sun; the room's other objects are known."""
+    true = sunny.light(room, DARK_FLOOR)
+    patch = (sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]) & (room.atlas.object_id == 0)
+    lit = clipped_at(measured(room, true), share * float(np.median(true[patch].max(1))))
+    settings = Settings(shading_rays=64, emitter_rays=16, threads=2)
+    by_bound, found = (
+        shade(room.surface, room.instances, lit, sky_map(), replace(settings, without=without))
+        for without in (("clipped-sunlight",), ())
+    )
+    E, shade_of_all = np.pi * true / room.by_object(DARK_FLOOR), sunny.sun_on(room) == 0
+    assert by_bound.sun.irradiance @ LUMINANCE < 0.75 * sunny.SUN @ LUMINANCE
+    assert found.sun.irradiance @ LUMINANCE == pytest.approx(sunny.SUN @ LUMINANCE, rel=0.2)
+    off, off_by_bound = (
+        np.abs(np.median(shading.irradiance[shade_of_all] / E[shade_of_all], 0) @ LUMINANCE - 1)
+        for shading in (found, by_bound)
+    )
+    assert off < min(0.06, off_by_bound)
