@@ -51,6 +51,8 @@ class Unknown:
         Radiances that the prior expects, and 1. As the sun was measured, its prior has the full weight.
     any_level : (k + s,) bool, or one for all
         Sources of which only the colour is expected: their level was taken from the same L_d, which would count twice.
+    known : (k + s, 3) bool, or one for all
+        Channels that keep their lower bound.
     """
 
     contribution: np.ndarray
@@ -58,6 +60,7 @@ class Unknown:
     lower: np.ndarray
     expected: np.ndarray
     any_level: np.ndarray | bool = False
+    known: np.ndarray | bool = False
 
     def irradiance(self, radiance: np.ndarray) -> np.ndarray:
         """E from all of them at radiances and a factor ((k + s, 3)), (m, 3) float64."""
@@ -73,6 +76,7 @@ class Unknown:
             self.lower[which],
             self.expected[which],
             np.broadcast_to(self.any_level, which.shape)[which],
+            np.broadcast_to(self.known, self.lower.shape)[which],
         )
 
     def transposed(self, values: np.ndarray) -> np.ndarray:
@@ -153,12 +157,13 @@ def solve(
     """
     cost = _NegativeLogPosterior(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.lower, 1e-6))
+    high = np.where(unknown.known, low, np.maximum(cost.expected, low) + 12)
     start = cost.expected + np.where(cost.any_level, 0, np.log(JOINT_FIT.start))[:, None]
     log_radiance = low  # of a closed mesh without clipped patches nothing is unknown
     if low.size:
         log_radiance = minimize(
-            cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
-            bounds=np.stack([low, np.maximum(cost.expected, low) + 12], -1).reshape(-1, 2),
+            cost, np.clip(start, low, high).ravel(), jac=True, method="L-BFGS-B",
+            bounds=np.stack([low, high], -1).reshape(-1, 2),
             options={"maxiter": LEVELS.steps},
         ).x.reshape(low.shape)  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +44,9 @@ def _choose(best: Summary, edge: Summary, saturated: Summary) -> LitDiffuse:
     take(EDGE, edge, (clean < VISIBILITY.enough) & (edge.count >= clean))
     quartiles = (saturated.lower, saturated.median, saturated.upper)
     above = sum((quartile @ LUMINANCE >= best.median @ LUMINANCE) * 0.25 for quartile in quartiles)
-    take(SATURATED, saturated, (tier < 0) | (above * saturated.count > clean + edge.count))
+    # Each is a lower bound. That of a frame exposed for less is nearer.
+    bound = replace(saturated, median=saturated.upper)
+    take(SATURATED, bound, (tier < 0) | (above * saturated.count > clean + edge.count))
     clipped = saturated.count / np.maximum(clean + edge.count + saturated.count, 1)
     return LitDiffuse(best.median, best.interquartile_range, best.count, tier, clipped.astype(np.float32))
 

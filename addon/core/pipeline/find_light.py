@@ -41,6 +41,8 @@ class Search:
         `turned_by_noise`.
     whole : (n,) int
         The object of each element before `patches` were set apart.
+    lower : (n, 3) bool
+        Channels of L_d that are lower bounds.
     """
 
     dark: LightField
@@ -54,6 +56,7 @@ class Search:
     cameras: Sequence[Camera]
     patches: list[int] | None
     whole: np.ndarray
+    lower: np.ndarray
 
 
 def with_all_light(search: Search) -> tuple[LightField, Light, np.ndarray]:
@@ -118,14 +121,14 @@ def with_sun_found(
     good : (n,) bool
         As in `find_light`.
     """
-    dark, seed, lit_diffuse = search.dark, search.seed, search.lit_diffuse
+    dark, seed, lower = search.dark, search.seed, search.lower
     object_id, lamps = unmixed.atlas.object_id, [lamp.object_id for lamp in light.lamps]
     lit_field = unmixed.with_light(lit_by(unmixed, list(light.lamps)), light.environment, lamps)
     unlit = ~np.isin(object_id, lamps)
-    free, clipped = unlit[light.element], lit_diffuse.seen & (lit_diffuse.clipped > 0.5)
+    free, clipped = unlit[light.element], lower.any(1)
     sun_fit = find_sun(
         unmixed, light.element[free], light.received[free], good & unlit,
-        lambda element: irradiance_at(lit_field, element, seed), object_id, clipped, seed,
+        lambda element: irradiance_at(lit_field, element, seed), object_id, lower, seed,
     )  # fmt: skip
     if sun_fit is None:
         return light, dark
@@ -135,7 +138,9 @@ def with_sun_found(
         sent = with_clipped_sunlight(lit_by_sun, clipped & unlit, light.element[free], light.received[free], object_id)
         sunlit = (sent > lit_by_sun.radiance).any(1)
     if sunlit.any():
-        light_with_sun = find(lit_by_sun.with_light(sent), before=light, good=good & ~sunlit, sunlit=sunlit)
+        light_with_sun = find(
+            lit_by_sun.with_light(sent), before=light, good=good & ~sunlit, sunlit=sunlit, measured=sun_fit.measured
+        )
         dark = dark.with_light(np.where(sunlit[:, None], sent, dark.radiance))
         return light_with_sun, with_sunlight(dark, sunlit, light_with_sun.sun)
     light_with_sun = find(lit_by_sun, before=light)
@@ -182,8 +187,8 @@ def with_missing_light(
         return lit_field, light_found, missing.shut
     element = spread_over(dark, np.flatnonzero(lit_diffuse.seen), SUN.even, np.random.default_rng([seed, 4]))
     irradiance_by_all = partial(irradiance_at, lit_field, seed=seed)
-    received, clipped = irradiance_by_all(element), lit_diffuse.seen & (lit_diffuse.clipped > 0.5)
-    solved = find_sun(dark, element, received, lit_diffuse.seen, irradiance_by_all, whole, clipped, seed)
+    received, clipped = irradiance_by_all(element), search.lower.any(1)
+    solved = find_sun(dark, element, received, lit_diffuse.seen, irradiance_by_all, whole, search.lower, seed)
     if solved is None:
         return lit_field, light_found, missing.shut
     bound, sunlit, dark = dark.radiance, np.zeros(len(clipped), bool), dark.with_sun(solved.sun)

@@ -48,6 +48,7 @@ STAGE = Stage(
     (SURFACE, FRAMES),
     ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors", "seed"),
 )
+WHITE = np.ones(3)
 SHADING = kinds_of(Shading, Lamp, Environment, Mirror, Sun, Openings, Patches)
 """What a stored `Shading` may hold."""
 
@@ -90,6 +91,7 @@ def find_shading(
             surface, capture.instances, lit_diffuse, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, shining=shining,
             patches=patches.lamps if parts_guessed else None, whole=whole, cameras=cameras,
+            clip_colour=observed.calibration.clip_colour,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -145,6 +147,7 @@ def shade(
     patches: list[int] | None = None,
     whole: np.ndarray | None = None,
     cameras: Sequence[Camera] = (),
+    clip_colour: np.ndarray = WHITE,
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
 
@@ -161,6 +164,8 @@ def shade(
         The object of each element before any were set apart.
     cameras : sequence of Camera
         Of the frames.
+    clip_colour : (3,) float64
+        At which they clip.
 
     Raises
     ------
@@ -186,7 +191,7 @@ def shade(
     kinds = lamp_kinds(mesh, instances, surface.noise)
     field, light, solved = with_all_light(Search(
         dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, cameras, patches,
-        atlas.object_id if whole is None else whole,
+        atlas.object_id if whole is None else whole, lit_diffuse.seen[:, None] & lit_diffuse.lower_bounds(clip_colour),
     ))  # fmt: skip
     del dark
     field = field.with_unseen(None)  # the search for lamps alone asked for it

@@ -4,6 +4,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+CLIPPED_TOO = 0.8
+"""Of the level at which an element's brightest channel clips: from there on another may be clipped as well, as the
+camera's white balance changes between frames."""
+
 
 @dataclass(frozen=True)
 class LitDiffuse:
@@ -33,6 +37,15 @@ class LitDiffuse:
         """This where `mask` ((n,) bool), the other one elsewhere."""
         parts = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
         return LitDiffuse(*(np.where(mask if a.ndim == 1 else mask[:, None], a, b) for a, b in parts))
+
+    def lower_bounds(self, clip: np.ndarray) -> np.ndarray:
+        """Channels that are lower bounds as most frames show the element clipped, (n, 3) bool.
+
+        In frames that clip at the colour `clip` ((3,)) these are about as bright as the brightest; what a sensor holds
+        of the others it measures.
+        """
+        level = np.nan_to_num(self.radiance) / clip
+        return (self.clipped > 0.5)[:, None] & (level >= CLIPPED_TOO * level.max(1, keepdims=True))
 
     @property
     def seen(self) -> np.ndarray:

@@ -62,6 +62,12 @@ class Calibration:
         response = np.tile(srgb_to_linear(CODES), (3, 1))
         return cls(response, np.ones((frames, 3)), np.zeros(2), np.zeros(frames, bool), np.array(np.nan))
 
+    @property
+    def clip_colour(self) -> np.ndarray:
+        """At which frames clip as a rule, (3,) float64, the greatest channel 1."""
+        colour = np.median(self.gain, 0) if len(self.gain) else np.ones(3)
+        return colour / colour.max()
+
     def of(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
         """The frames with their radiometry."""
         response = at_16_bits(self.response)

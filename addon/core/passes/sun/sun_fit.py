@@ -110,6 +110,11 @@ class SolvedSun:
     _even: Spots
     _edges: Edges
 
+    @property
+    def measured(self) -> np.ndarray:
+        """Channels that it was found in though most of what it lights is clipped, (3,) bool."""
+        return self._edges.measured(self.sun.direction)
+
     def times(self, factor: np.ndarray) -> Sun:
         """The sun so many times as bright ((3,)), of a colour that a sun can have."""
         irradiance = self.sun.irradiance * factor
@@ -131,7 +136,7 @@ def find_sun(
     good: np.ndarray,
     irradiance: Callable[[np.ndarray], np.ndarray],
     object_id: np.ndarray,
-    clipped: np.ndarray,
+    lower: np.ndarray,
     seed: int = 0,
 ) -> SolvedSun | None:
     """The sun that explains a patch of light best; None where nothing is short of light or no sun explains it.
@@ -148,12 +153,12 @@ def find_sun(
         Elements that may be asked.
     irradiance : callable
         E by all known light at elements, (k,) int -> (k, 3) float64.
-    object_id, clipped : (n,) int, (n,) bool
-        The object of each element, and whether its radiance is a lower bound.
+    object_id, lower : (n,) int, (n, 3) bool
+        The object of each element, and which channels of its radiance are lower bounds.
     """
 
     def spots(elements: np.ndarray, E: np.ndarray) -> Spots:
-        return Spots(field, elements, E, object_id, clipped)
+        return Spots(field, elements, E, object_id, lower)
 
     if len(element) < LEVELS.few:
         return None

@@ -65,18 +65,19 @@ class Spots:
     element : (m,) int
     received : (m, 3) float64
         E there, without the sun.
-    object_id, clipped : (n,) int, (n,) bool
-        Of all elements of the room: the object; whether the radiance is a lower bound.
+    object_id, lower : (n,) int, (n, 3) bool
+        Of all elements of the room: the object; which channels of the radiance are lower bounds.
     """
 
     def __init__(
-        self, field: LightField, element: np.ndarray, received: np.ndarray, object_id: np.ndarray, clipped: np.ndarray
+        self, field: LightField, element: np.ndarray, received: np.ndarray, object_id: np.ndarray, lower: np.ndarray
     ):
         atlas = field.atlas
         self.scene = field.scene
         self.position, self.normal = atlas.position[element], atlas.normal[element]
         self.sample = Sample(element, object_id[element], field.radiance[element].astype(np.float64), received)
-        self.clipped = clipped[element]
+        self.lower = lower[element]
+        self.clipped = self.lower.any(1)
         self.edge = atlas.texel_edge
 
     @property
@@ -204,31 +205,72 @@ class Edges:
     def strengths(self, direction: np.ndarray, bounds: bool = True) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
-        Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
-        median share of what is not clipped, white if that is too little. Where all is, the median bound; 0 if unknown.
-        Without `bounds` it is also unknown where most of what is lit is clipped.
+        A clipped element gives lower bounds. Where clipped ones tell a channel all the same (`measured`), by channels.
+        Else the median of luminance, and of a channel its median share of what is not clipped, white if that is too
+        little. Where all is, the median bound; 0 if unknown. Without `bounds` it is also unknown where most of what is
+        lit is clipped.
+        """
+        needed, lower = self._needed(direction)
+        clipped = lower.any(1)
+        if not len(needed) or not bounds and 2 * np.count_nonzero(clipped) > len(clipped):
+            return np.zeros(4)
+        channels, measured = _despite_clipping(needed, lower)
+        if measured.any():
+            # White, unless the bound of another channel is above that.
+            channels[~measured] = np.maximum(channels[~measured], channels[measured].mean())
+            return np.maximum([*channels, channels @ LUMINANCE], 0)
+        luminance = needed[:, 3]
+        unclipped = ~clipped & (luminance > 0)
+        if not unclipped.any():
+            return np.full(4, max(np.median(luminance), 0))
+        strength, _ = _censored_median(luminance, clipped)
+        shares = [1.0] * 3
+        if unclipped.sum() >= LEVELS.few:
+            shares = [np.median(needed[unclipped, k] / luminance[unclipped]) for k in range(3)]
+        return np.maximum(strength * np.array([*shares, 1]), 0)
+
+    def measured(self, direction: np.ndarray) -> np.ndarray:
+        """Channels whose strength is known though most of what is lit is clipped, as that has others clipped, (3,)."""
+        return _despite_clipping(*self._needed(direction))[1]
+
+    def _needed(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Irradiance that each lit element beside shade needs to be like that, in three channels and luminance, (k, 4).
+
+        And which of the channels are lower bounds, (k, 3) bool. None where there are too few.
         """
         spots = self.spots
         contribution = spots.contribution(direction)
         a, b = self._two_sides(direction, contribution > 0)
         if len(a) < LEVELS.enough:
-            return np.zeros(4)
-        full, clipped = contribution[a], spots.clipped[a]
-        if not bounds and 2 * np.count_nonzero(clipped) > len(a):
-            return np.zeros(4)
-
-        def needed(weights: np.ndarray) -> np.ndarray:
+            return np.zeros((0, 4)), np.zeros((0, 3), bool)
+        needed = []
+        for weights in (*np.eye(3), LUMINANCE):
             value, received = spots.log_albedo(weights=weights), spots.sample.received @ weights
-            return received[a] * (np.exp(value[a] - value[b]) - 1) / full
+            needed.append(received[a] * (np.exp(value[a] - value[b]) - 1) / contribution[a])
+        return np.stack(needed, 1), spots.lower[a]
 
-        luminance = needed(LUMINANCE)
-        unclipped = ~clipped & (luminance > 0)
-        if not unclipped.any():
-            return np.full(4, max(np.median(luminance), 0))
-        survival = ecdf(CensoredData.right_censored(luminance, clipped)).sf
-        half = np.flatnonzero(survival.probabilities <= 0.5)
-        strength = survival.quantiles[half[0]] if len(half) else luminance[unclipped].max()
-        shares = [1.0] * 3
-        if unclipped.sum() >= LEVELS.few:
-            shares = [np.median(needed(channel)[unclipped] / luminance[unclipped]) for channel in np.eye(3)]
-        return np.maximum(strength * np.array([*shares, 1]), 0)
+
+def _despite_clipping(needed: np.ndarray, lower: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each channel's strength where most elements are clipped, (3,), and whether they tell it all the same, (3,) bool.
+
+    `needed` and `lower` as by `Edges._needed`.
+    """
+    if 2 * np.count_nonzero(lower.any(1)) <= len(lower):
+        return np.zeros(3), np.zeros(3, bool)
+    channels, measured = zip(*(_censored_median(needed[:, k], lower[:, k]) for k in range(3)), strict=True)
+    return np.array(channels), np.array(measured)
+
+
+def _censored_median(values: np.ndarray, censored: np.ndarray) -> tuple[float, bool]:
+    """The median of values of which some are lower bounds (Kaplan and Meier 1958), and whether many tell it.
+
+    Else the greatest that is no bound, or the median bound.
+    """
+    exact = ~censored & (values > 0)
+    if not exact.any():
+        return float(np.median(values)), False
+    survival = ecdf(CensoredData.right_censored(values, censored)).sf
+    half = np.flatnonzero(survival.probabilities <= 0.5)
+    if not len(half):
+        return float(values[exact].max()), False
+    return float(survival.quantiles[half[0]]), bool(exact.sum() >= LEVELS.enough)

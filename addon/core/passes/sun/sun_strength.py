@@ -45,7 +45,8 @@ def strength_without_gloss(
     beside = along_edges(field, pool, sun.direction)
     if len(beside) < LEVELS.few:
         return None
-    spots = Spots(field.with_light(diffuse), beside, irradiance[beside].astype(np.float64), object_id, clipped)
+    received, lower = irradiance[beside].astype(np.float64), clipped[:, None].repeat(3, 1)
+    spots = Spots(field.with_light(diffuse), beside, received, object_id, lower)
     strengths = Edges(spots).strengths(sun.direction, bounds=False)
     if strengths[-1] <= 0 or not is_sunlike(strengths):
         return None

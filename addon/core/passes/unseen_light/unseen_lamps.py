@@ -137,6 +137,7 @@ def solve_together(
     base: np.ndarray,
     bounds: Mapping[int, np.ndarray],
     by_sun: np.ndarray,
+    measured: np.ndarray,
     seed: int,
 ) -> tuple[list[Lamp], np.ndarray]:
     """Lamps, and in place the sky, solved for once more by what albedo is plausible (`joint_fit`).
@@ -163,6 +164,7 @@ def solve_together(
         np.stack([*(bounds.get(lamp.object_id, np.zeros(3)) for lamp in free), *(low for low, _ in of_sky), *of_sun]),
         np.stack([*(_like_its_bound(lamp, bounds) for lamp in free), *(sky.radiance[i] for i in parts), *of_sun]),
         np.array([True] * len(free) + [False] * len(parts) + [True] * suns),
+        np.concatenate([np.zeros((len(free) + len(parts), 3), bool), np.tile(measured, (suns, 1))]),
     )
     known = all_light(base, kept, contribution, sky.without(parts)) - by_sun.sum(1)
     position, normal = atlas.position[sample.element], atlas.normal[sample.element]

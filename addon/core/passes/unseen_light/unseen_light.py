@@ -106,6 +106,7 @@ def find_light(
     before: Light | None = None,
     without: Collection[str] = (),
     sunlit: np.ndarray | None = None,
+    measured: np.ndarray | None = None,
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -126,7 +127,10 @@ def find_light(
         What was found in the same room without its sun, or of its mixed lamps.
     sunlit : (n,) bool, optional
         Elements that send more than frames show, as the field's sun is on them. That is solved for with all the rest.
+    measured : (3,) bool, optional
+        Channels of the sun that are known all the same.
     """
+    measured = np.zeros(3, bool) if measured is None else measured
     sunlit = np.zeros(len(field.atlas), bool) if sunlit is None else sunlit
     original, mixed = field, before.mixed if before is not None else ()
     if before is not None:
@@ -214,7 +218,9 @@ def find_light(
     lamps, sky = needed(sample, lamps, contribution, sky, received, certain)
     sun = np.ones(3)
     if "plausible-light" not in without and (certain or any(sky.clipped) or sunlit.any()):
-        lamps, sun = solve_together(sample, atlas, lamps, contribution, sky, received, certain, by_factor[lit], seed)
+        lamps, sun = solve_together(
+            sample, atlas, lamps, contribution, sky, received, certain, by_factor[lit], measured, seed
+        )
     lamps = [
         replace(lamp, object_id=object_id, mixed=object_id in mixed)
         for lamp in lamps

@@ -117,3 +117,9 @@ def test_frames_of_floats_and_too_few_codes_are_left_alone():
     assert found.of(frames) == tuple(frames)
     few = [replace(frame, transfer=AUTO) for frame in frames[:2]]
     assert not calibrate(room.mesh, room.scene, few, lambda frame: pytest.fail("was read")).calibrated.any()
+
+
+def test_frames_clip_at_the_colour_that_their_gains_make_white():
+    calibration = replace(Calibration.none(3), gain=np.array([[1.0, 2, 3], [2, 4, 8], [1, 2, 4]]))
+    assert calibration.clip_colour.tolist() == [0.25, 0.5, 1]
+    assert Calibration.none(0).clip_colour.tolist() == [1, 1, 1]

@@ -43,6 +43,10 @@ def sky_map(seen=None) -> Environment:
     return Environment(radiance, count if seen is None else seen)
 
 
+def no_bounds(room) -> np.ndarray:
+    return np.zeros((len(room.atlas), 3), bool)
+
+
 def run(room, radiance, environment=None, **more):
     environment = environment or sky_map()
     settings = Settings(shading_rays=64, emitter_rays=16, threads=2)
@@ -78,7 +82,7 @@ def test_a_wide_opening_does_not_hide_the_window_of_the_sun():
     patch = sunny.sun_on(room) > 0.5 * sunny.TOWARDS[2]
     chosen = patch | (np.random.default_rng(0).random(len(patch)) < 2 * patch.mean())
     field = LightField(room.mesh, room.atlas, room.scene, np.ones((len(patch), 3), np.float32), Environment.dark())
-    spots = Spots(field, np.arange(len(patch)), np.ones((len(patch), 3)), room.atlas.object_id, np.zeros(len(patch)))
+    spots = Spots(field, np.arange(len(patch)), np.ones((len(patch), 3)), room.atlas.object_id, no_bounds(room))
     assert min(angle(d, sunny.TOWARDS) for d in _reaching_most(spots, chosen)) < np.degrees(GRID)
 
 
@@ -290,7 +294,8 @@ def sun_by(room, lit: LitDiffuse) -> Sun | None:
         return irradiance_at(field, element, 0)
 
     element = np.sort(np.random.default_rng(0).choice(len(room.atlas), 8000, replace=False))
-    found = find_sun(field, element, irradiance(element), lit.seen, irradiance, room.atlas.object_id, lit.clipped > 0.5)
+    lower = lit.lower_bounds(np.ones(3))
+    found = find_sun(field, element, irradiance(element), lit.seen, irradiance, room.atlas.object_id, lower)
     return found and found.sun
 
 
@@ -341,7 +346,7 @@ def test_a_sun_is_found_by_shadows_that_lie_a_little_off(off, seed):
 def test_how_much_a_sun_raises_the_light_is_told_where_it_falls(room):
     """Three elements of ten get three times as much by it."""
     field, element = room.field(np.ones((len(room.atlas), 3), np.float32), sky_map()), np.arange(10)
-    spots = Spots(field, element, np.full((10, 3), 0.5), room.atlas.object_id, np.zeros(len(room.atlas), bool))
+    spots = Spots(field, element, np.full((10, 3), 0.5), room.atlas.object_id, no_bounds(room))
     assert spots.raised(np.where(element < 3, 0.25, 0), 4.0) == pytest.approx(np.log(3))
     assert spots.raised(np.zeros(10), 4.0) == 0
 
@@ -382,12 +387,11 @@ def test_a_clipped_patch_sends_what_it_reflects_of_the_sun(room):
     assert np.array_equal(bound[patch], lit.radiance[patch])
 
 
-@pytest.mark.parametrize("share", [0.2, 0.4])
-def test_a_sun_whose_patch_is_clipped_is_as_strong_as_what_the_patch_reflects_into_the_room_tells(room, share):
-    """Its level, a share of what it sends, tells only as much of the sun; the room's other objects are known."""
+def test_a_sun_whose_patch_is_clipped_is_as_strong_as_what_the_patch_reflects_into_the_room_tells(room):
+    """Its level, a fifth of what it sends, tells only as much of the sun; the room's other objects are known."""
     true = sunny.light(room, DARK_FLOOR)
     patch = (sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]) & (room.atlas.object_id == 0)
-    lit = clipped_at(measured(room, true), share * float(np.median(true[patch].max(1))))
+    lit = clipped_at(measured(room, true), 0.2 * float(np.median(true[patch].max(1))))
     settings = Settings(shading_rays=64, emitter_rays=16, threads=2)
     by_bound, found = (
         shade(room.surface, room.instances, lit, sky_map(), replace(settings, without=without))
@@ -401,3 +405,28 @@ def test_a_sun_whose_patch_is_clipped_is_as_strong_as_what_the_patch_reflects_in
         for shading in (found, by_bound)
     )
     assert off < min(0.06, off_by_bound)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sun_is_as_strong_as_the_channels_tell_that_no_frame_clips(room, seed):
+    """All of the patch is clipped in red, where its level is half of what a brown floor sends; none in blue."""
+    true = sunny.light(room, DARK_FLOOR)
+    patch = (sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]) & (room.atlas.object_id == 0)
+    lit = measured(room, true, texture=0.05, seed=seed)
+    lit = clipped_at(lit, 0.5 * float(np.median(true[patch].max(1))))
+    lower = lit.lower_bounds(np.ones(3))
+    assert lower[patch, 0].mean() > 0.95 and not lower[patch, 2].any()
+    found = sun_by(room, lit)
+    assert found.irradiance[2] == pytest.approx(sunny.SUN[2], rel=0.15)
+    # Of the others it is known that a sun is about white.
+    assert 0.7 < found.irradiance @ LUMINANCE / (sunny.SUN @ LUMINANCE) < 1.2
+
+
+def test_which_channels_are_lower_bounds_goes_by_the_colour_at_which_frames_clip():
+    """A camera that takes yellow light for white holds twice as much blue."""
+    radiance = np.float32([[1, 1, 2], [1, 1, 0.9], [0.2, 1, 2], [1, 1, 2], [1, np.nan, 1]])
+    share = np.float32([1, 1, 0.6, 0.4, 1])
+    lit = LitDiffuse(radiance, np.zeros((5, 3)), np.ones(5, np.int32), np.zeros(5, np.int8), share)
+    bounds = lit.lower_bounds(np.array([0.5, 0.5, 1]))
+    assert bounds[:3].tolist() == [[True, True, True], [True, True, False], [False, True, True]]
+    assert not bounds[3].any()

@@ -20,6 +20,7 @@ def solved(
     by_lamp: float = 0.5,
     clipped_at: np.ndarray | None = None,
     sun: float = 0.0,
+    measured: tuple[bool, bool, bool] = (False, False, False),
 ) -> tuple[list[Lamp], Sky, np.ndarray]:
     """A floor of two paints under a lamp, one like a seen one, and a part of the sky; the first and last `told`.
 
@@ -39,7 +40,9 @@ def solved(
     sky.radiance = [np.maximum(told, lower) * SKY]
     bounds = {} if clipped_at is None else {1: clipped_at}
     contribution = {1: at_lamp, 2: at_twin}
-    lamps, factor = solve_together(sample, room.atlas, lamps, contribution, sky, base, bounds, sun * by_sun, 0)
+    lamps, factor = solve_together(
+        sample, room.atlas, lamps, contribution, sky, base, bounds, sun * by_sun, np.array(measured), 0
+    )
     return lamps, sky, factor
 
 
@@ -76,7 +79,9 @@ def test_where_nothing_is_unknown_all_stays():
     twin, sky = Lamp(2, TWIN, False, twin=5), Sky([], [], [], [])
     room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0)], 0.5)
     E, no_sun = np.ones((4, 3)), np.zeros((4, 0, 3))
-    lamps, factor = solve_together(sample, room.atlas, [twin], {2: np.ones(4)}, sky, E, {}, no_sun, 0)
+    lamps, factor = solve_together(
+        sample, room.atlas, [twin], {2: np.ones(4)}, sky, E, {}, no_sun, np.zeros(3, bool), 0
+    )
     assert lamps == [twin] and not sky.solved and factor.tolist() == [1, 1, 1]
 
 
@@ -89,3 +94,8 @@ def test_a_sun_of_which_a_lower_bound_is_known_is_as_strong_as_it_lights_the_roo
 
 def test_a_sun_is_no_weaker_than_its_lower_bound():
     assert (solved(1.0, sun=1.5)[2] >= 1 - 1e-6).all()
+
+
+def test_a_channel_of_the_sun_that_is_measured_stays_and_the_others_are_likely_alike():
+    *_, factor = solved(1.0, sun=0.6, measured=(False, False, True))
+    assert factor[2] == pytest.approx(1) and (factor[:2] < solved(1.0, sun=0.6)[2][:2]).all()
