@@ -112,7 +112,7 @@ class SolvedSun:
 
     @property
     def measured(self) -> np.ndarray:
-        """Channels that it was found in though most of what it lights is clipped, (3,) bool."""
+        """Channels whose strength is known though what it lights is clipped in others, (3,) bool."""
         return self._edges.measured(self.sun.direction)
 
     def times(self, factor: np.ndarray) -> Sun:

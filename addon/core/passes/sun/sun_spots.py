@@ -205,10 +205,10 @@ class Edges:
     def strengths(self, direction: np.ndarray, bounds: bool = True) -> np.ndarray:
         """Irradiance that makes what is lit like the nearest in shade: each channel's, and luminance's, (4,).
 
-        A clipped element gives lower bounds. Where clipped ones tell a channel all the same (`measured`), by channels.
-        Else the median of luminance, and of a channel its median share of what is not clipped, white if that is too
-        little. Where all is, the median bound; 0 if unknown. Without `bounds` it is also unknown where most of what is
-        lit is clipped.
+        Of luminance the median by Kaplan and Meier (1958), as a clipped element gives a lower bound; of a channel its
+        median share of what is not clipped. Where that is too little, by channels that clipped elements tell
+        (`measured`); else white, where all is clipped by the median bound; 0 if unknown. Without `bounds` it is also
+        unknown where most of what is lit is clipped.
         """
         needed, lower = self._needed(direction)
         clipped = lower.any(1)
@@ -216,8 +216,8 @@ class Edges:
             return np.zeros(4)
         channels, measured = _despite_clipping(needed, lower)
         if measured.any():
-            # White, unless the bound of another channel is above that.
-            channels[~measured] = np.maximum(channels[~measured], channels[measured].mean())
+            # As bright as those that are, unless the bounds are above that.
+            channels[~measured] = np.maximum(channels[~measured], channels[measured].max())
             return np.maximum([*channels, channels @ LUMINANCE], 0)
         luminance = needed[:, 3]
         unclipped = ~clipped & (luminance > 0)
@@ -230,7 +230,7 @@ class Edges:
         return np.maximum(strength * np.array([*shares, 1]), 0)
 
     def measured(self, direction: np.ndarray) -> np.ndarray:
-        """Channels whose strength is known though most of what is lit is clipped, as that has others clipped, (3,)."""
+        """Channels whose strength is known though all but a few of what is lit have others clipped, (3,) bool."""
         return _despite_clipping(*self._needed(direction))[1]
 
     def _needed(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -251,14 +251,16 @@ class Edges:
 
 
 def _despite_clipping(needed: np.ndarray, lower: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each channel's strength where most elements are clipped, (3,), and whether they tell it all the same, (3,) bool.
+    """Each channel's strength where all but a few are clipped, (3,), and whether they tell it all the same, (3,) bool.
 
-    `needed` and `lower` as by `Edges._needed`.
+    Where not, the median bound. `needed` and `lower` as by `Edges._needed`.
     """
-    if 2 * np.count_nonzero(lower.any(1)) <= len(lower):
+    clipped = lower.any(1)
+    unclipped = np.count_nonzero(~clipped & (needed[:, 3] > 0))
+    if unclipped >= LEVELS.few or 2 * np.count_nonzero(clipped) <= len(clipped):
         return np.zeros(3), np.zeros(3, bool)
     channels, measured = zip(*(_censored_median(needed[:, k], lower[:, k]) for k in range(3)), strict=True)
-    return np.array(channels), np.array(measured)
+    return np.where(measured, channels, np.median(needed[:, :3], 0)), np.array(measured)
 
 
 def _censored_median(values: np.ndarray, censored: np.ndarray) -> tuple[float, bool]:
