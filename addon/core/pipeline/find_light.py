@@ -142,7 +142,8 @@ def with_sun_found(
             lit_by_sun.with_light(sent), before=light, good=good & ~sunlit, sunlit=sunlit, measured=sun_fit.measured
         )
         dark = dark.with_light(np.where(sunlit[:, None], sent, dark.radiance))
-        return light_with_sun, with_sunlight(dark, sunlit, light_with_sun.sun)
+        dark = with_sunlight(dark, sunlit, light_with_sun.sun)
+        return light_with_sun, dark.with_sun(sun_fit.times(light_with_sun.sun))
     light_with_sun = find(lit_by_sun, before=light)
     if not len(light_with_sun.received):
         return light_with_sun, dark

@@ -145,6 +145,21 @@ def solve_together(
     By the spread within objects alone they come out too dark where most of the light is unknown. A lamp that shines as
     a seen one does keeps its radiance. One that the sensor clipped is no darker than that (`bounds`, (3,) each), and
     likely of that colour, which is about the white that a camera balances for.
+
+    Parameters
+    ----------
+    base : (m, 3) float64
+        E from what is known, and from the sun.
+    by_sun : (m, 1, 3) float64, or (m, 0, 3)
+        Of it, that from a sun which is at least as strong, and which is solved for as well.
+    measured : (3,) bool
+        Channels in which it is as strong as that.
+
+    Returns
+    -------
+    lamps : list of Lamp
+    factor : (3,) float64
+        Of the sun.
     """
     free = [lamp for lamp in lamps if lamp.twin is None]
     kept = [lamp for lamp in lamps if lamp.twin is not None]
