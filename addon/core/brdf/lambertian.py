@@ -2,8 +2,11 @@
 
 from dataclasses import dataclass
 
+from ..kinds import Unit
 from .model import Brdf
 
+WHITE_PAINT: Unit[float] = 0.8
+"""Albedo of white wall paint, as the panel has it."""
 TYPICAL_ALBEDO = 0.5
 """Of a room's surfaces, on average: what is taken where nothing is known."""
 

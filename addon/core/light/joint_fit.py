@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ..brdf.lambertian import TYPICAL_ALBEDO
+from ..brdf.lambertian import TYPICAL_ALBEDO, WHITE_PAINT
 from ..scene.params import COPLANAR
 from ..significance import LEVELS
 from .params import JOINT_FIT
@@ -87,9 +87,16 @@ class Unknown:
 class _NegativeLogPosterior:
     """Minus the log posterior, and its gradient, of the log radiances."""
 
-    def __init__(self, sent: np.ndarray, received: np.ndarray, unknown: Unknown, pairs: np.ndarray):
+    def __init__(
+        self,
+        sent: np.ndarray,
+        received: np.ndarray,
+        unknown: Unknown,
+        pairs: np.ndarray,
+        area: np.ndarray | None = None,
+    ):
         self._sent = np.log(np.maximum(np.pi * sent, 1e-9))
-        self._received, self._unknown = received, unknown
+        self._received, self._unknown, self._area = received, unknown, area
         p, m = len(pairs), len(sent)
         ends = np.stack([np.ones(p), -np.ones(p)], 1).ravel()
         self._difference = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
@@ -125,6 +132,11 @@ class _NegativeLogPosterior:
         root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)
         value += LEVELS.sigmas**2 * float((root - 1).mean())
         grad_a += excess / root / (0.1 * channels * m)
+        if self._area is not None:
+            brightest, weight = self._brightest(a)
+            offset = (weight @ a[brightest].mean(1) - np.log(WHITE_PAINT)) / JOINT_FIT.deviation
+            value += 0.5 * float(offset**2)
+            grad_a[brightest] += (offset / (JOINT_FIT.deviation * channels) * weight)[:, None]
         gradient = -self._unknown.transposed(grad_a / E) * radiance
         deviation = x - self.expected
         level = deviation.mean(1, keepdims=True) / JOINT_FIT.unlike
@@ -136,9 +148,18 @@ class _NegativeLogPosterior:
         gradient += 2 * self._weight * tint / (JOINT_FIT.tint * coloured)
         return value, gradient.ravel()
 
+    def _brightest(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Elements of the greatest log albedo but for outliers, (b,) int, and their shares of the area, (b,)."""
+        assert self._area is not None
+        order = np.argsort(a.mean(1))
+        share = np.cumsum(self._area[order]) / self._area.sum()
+        low, high = np.searchsorted(share, JOINT_FIT.white)
+        brightest = order[low : max(high, low + 1)]
+        return brightest, self._area[brightest] / self._area[brightest].sum()
+
 
 def solve(
-    sent: np.ndarray, received: np.ndarray, unknown: Unknown, pairs: np.ndarray
+    sent: np.ndarray, received: np.ndarray, unknown: Unknown, pairs: np.ndarray, area: np.ndarray | None = None
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """The most plausible radiances.
 
@@ -148,6 +169,8 @@ def solve(
         L_d, and E from all that is known.
     pairs : (p, 2) int
         Elements that should be alike.
+    area : (m,) float, optional
+        Of the surface that each stands for, if the brightest of it is likely white paint (Land and McCann 1971).
 
     Returns
     -------
@@ -155,7 +178,7 @@ def solve(
     spread : (2,) tuple of float
         Mean deviation of log albedo between pairs under the expected radiances, and under these.
     """
-    cost = _NegativeLogPosterior(sent, received, unknown, pairs)
+    cost = _NegativeLogPosterior(sent, received, unknown, pairs, area)
     low = np.log(np.maximum(unknown.lower, 1e-6))
     high = np.where(unknown.known, low, np.maximum(cost.expected, low) + 12)
     start = cost.expected + np.where(cost.any_level, 0, np.log(JOINT_FIT.start))[:, None]

@@ -55,6 +55,11 @@ class Sample:
         """For each element the median of `values` ((m,)) over its object, the lower of two in the middle, (m,)."""
         return values[np.lexsort((values, self.group))[self._middle]][self.group]
 
+    def area(self, atlas: Atlas) -> np.ndarray:
+        """Of the surface that each element stands for, (m,): its object's, shared out evenly."""
+        of_object = np.bincount(atlas.object_id, atlas.weight)
+        return of_object[self.object_id] / np.bincount(self.group)[self.group]
+
     def spread(self, log_albedo: np.ndarray) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at a cap."""
         return float(np.minimum(np.abs(log_albedo - self.medians(log_albedo)), LIGHT_FIT.cap).mean())

@@ -4,16 +4,15 @@ import re
 
 import numpy as np
 
+from ..brdf.lambertian import WHITE_PAINT
 from ..errors import BadInputError
 from ..json_values import float_of
-from ..kinds import Shown, Unit
+from ..kinds import Shown
 from ..photo import MIDDLE_GREY
 from ..scene.model import Capture
 from ..scene.rays import RayScene
 from .overrides import White
 
-WHITE_PAINT: Unit[float] = 0.8
-"""Albedo of white wall paint, as the panel has it."""
 LISTED: Shown[int] = 6
 """Frames that are named where none is called so."""
 PIXEL = re.compile(r"(?P<frame>.+):\s*(?P<x>\d+)\s*,\s*(?P<y>\d+)\s*")

@@ -82,3 +82,37 @@ def test_a_source_that_is_not_believed_keeps_what_was_measured_and_the_rest_make
     assert (found[1] == 0.5).all() and found[0] == pytest.approx(alone[0])
     all_of_them, _ = solve_for_some(sent, received, unknown, pairs, lambda radiance: np.ones(2, bool))
     assert all_of_them == pytest.approx(both)
+
+
+@pytest.mark.parametrize("area_of_paper, true", [(0.001, 20), (2, 20 * 0.95 / 0.8)])
+def test_the_brightest_surface_is_white_paint_where_nothing_else_tells_the_level(area_of_paper, true):
+    """One lamp lights all alike, and so tells nothing of its radiance. Paper is brighter, but mostly small."""
+    rng, m = np.random.default_rng(5), 1000
+    albedo, area = rng.choice([0.2, 0.4, 0.8], m, p=[0.5, 0.3, 0.2]), np.ones(m)
+    paper = np.arange(m) < 50
+    albedo[paper], area[paper] = 0.95, area_of_paper
+    unknown = Unknown(np.ones((m, 1)), np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), 60.0), True)
+    sent, pairs = albedo[:, None] * 20 / np.pi * np.ones(3), rng.integers(0, m, (8 * m, 2))
+    (found,), _ = solve(sent, np.full((m, 3), 1e-3), unknown, pairs, area)
+    assert found == pytest.approx(true, rel=0.12)
+
+
+def test_without_that_the_level_is_drawn_to_that_of_a_usual_albedo():
+    rng, m = np.random.default_rng(5), 1000
+    albedo = rng.choice([0.2, 0.3, 0.8], m, p=[0.8, 0.1, 0.1])
+    unknown = Unknown(np.ones((m, 1)), np.zeros((m, 0, 3)), np.full((1, 3), 1e-6), np.full((1, 3), 60.0), True)
+    sent, pairs = albedo[:, None] * 20 / np.pi * np.ones(3), rng.integers(0, m, (8 * m, 2))
+    without, white = (
+        float(solve(sent, np.full((m, 3), 1e-3), unknown, pairs, area)[0].mean()) for area in (None, np.ones(m))
+    )
+    assert white == pytest.approx(20, rel=0.15) and abs(without - 20) > 2 * abs(white - 20)
+
+
+def test_a_channel_that_is_known_stays():
+    rng, m = np.random.default_rng(6), 500
+    through = rng.uniform(0, 0.1, (m, 1))
+    sent = 0.5 / np.pi * (1 + 20 * through) * np.ones(3)
+    known = np.array([[True, False, False]])
+    unknown = Unknown(through, np.zeros((m, 0, 3)), np.full((1, 3), 5.0), np.full((1, 3), 5.0), True, known)
+    (found,), _ = solve(sent, np.ones((m, 3)), unknown, rng.integers(0, m, (8 * m, 2)))
+    assert found[0] == pytest.approx(5) and (found[1:] > 8).all()

@@ -183,7 +183,8 @@ def solve_together(
     )
     known = all_light(base, kept, contribution, sky.without(parts)) - by_sun.sum(1)
     position, normal = atlas.position[sample.element], atlas.normal[sample.element]
-    radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed))
+    area = sample.area(atlas) if bounds else None
+    radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed), area)
     solved = [replace(lamp, radiance=s.astype(np.float32)) for lamp, s in zip(free, radiance[: len(free)], strict=True)]
     for i, (low, high), s in zip(parts, of_sky, radiance[len(free) : len(free) + len(parts)], strict=True):
         sky.radiance[i] = np.clip(s, low, high)
