@@ -94,12 +94,15 @@ def summary(count, value) -> Summary:
 
 
 def test_the_best_kind_of_observations_is_taken():
-    """Elements: enough clean; two clean, more at edges; two clean, one at an edge; edge; saturated; nothing."""
+    """Elements: enough clean; two clean, more at edges; two clean, one at an edge; edge; saturated; nothing.
+
+    Of what is saturated the upper quartile counts.
+    """
     clean, edge = summary([3, 2, 2, 0, 0, 0], 1), summary([9, 4, 1, 1, 0, 0], 2)
     result = _choose(clean, edge, summary([9, 4, 3, 1, 2, 0], 3))
     assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
     assert result.count.tolist() == [3, 4, 2, 1, 2, 0]
-    assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)
+    assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 4.5, np.nan], equal_nan=True)
     assert result.interquartile_range[:, 0].tolist() == [1, 2, 1, 2, 3, 0]
     assert result.seen.tolist() == [True] * 5 + [False]
 
@@ -110,7 +113,7 @@ def test_what_most_frames_clip_is_a_lower_bound():
     clipped.median[2] = 0.5
     result = _choose(clean, summary([0, 0, 0], 1), clipped)
     assert result.tier.tolist() == [SATURATED, CLEAN, CLEAN]
-    assert np.allclose(result.radiance[:, 0], [1.2, 1, 1])
+    assert np.allclose(result.radiance[:, 0], [1.8, 1, 1])
     assert np.allclose(result.clipped, [0.75, 0.5, 0.75])
 
 

@@ -168,6 +168,7 @@ def solve_together(
     suns = by_sun.shape[1]
     if not free and not parts and not suns:
         return lamps, np.ones(3)
+    # Beside a sun the sky's level rests on too little to be a prior, as a lamp's does.
     of_sky = [sky.bounds(i) for i in parts]
     by_white = np.reshape(
         [*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], (-1, len(base))
@@ -178,12 +179,12 @@ def solve_together(
         by_sun,
         np.stack([*(bounds.get(lamp.object_id, np.zeros(3)) for lamp in free), *(low for low, _ in of_sky), *of_sun]),
         np.stack([*(_like_its_bound(lamp, bounds) for lamp in free), *(sky.radiance[i] for i in parts), *of_sun]),
-        np.array([True] * len(free) + [False] * len(parts) + [True] * suns),
+        np.array([True] * len(free) + [bool(suns)] * len(parts) + [True] * suns),
         np.concatenate([np.zeros((len(free) + len(parts), 3), bool), np.tile(measured, (suns, 1))]),
     )
     known = all_light(base, kept, contribution, sky.without(parts)) - by_sun.sum(1)
     position, normal = atlas.position[sample.element], atlas.normal[sample.element]
-    area = sample.area(atlas) if bounds else None
+    area = sample.area(atlas) if bounds or suns else None
     radiance, _ = solve(sample.radiance, known, unknown, in_one_plane(position, normal, seed), area)
     solved = [replace(lamp, radiance=s.astype(np.float32)) for lamp, s in zip(free, radiance[: len(free)], strict=True)]
     for i, (low, high), s in zip(parts, of_sky, radiance[len(free) : len(free) + len(parts)], strict=True):
