@@ -164,8 +164,8 @@ class JointFitParams:
         `LEVELS.sigmas` of them and linearly beyond (pseudo-Huber).
     white : tuple of float
         Quantiles of albedo over the surface between which it is likely that of white paint, within `deviation`, where
-        no level of a lamp is known. In eight rooms (pixels, truth) the .97 quantile is .71 to .82, and the geometric
-        mean .19 to .46.
+        lamps or the sun's patch are clipped. In eight rooms (pixels, truth) the .97 quantile is .71 to .82, and the
+        geometric mean .19 to .46.
     sources : float
         Weight of the prior that a source is as bright as expected: an opening shows daylight as bright as the room, a
         patch its clipped value, and a lamp is an exception (Student's t).

@@ -18,7 +18,7 @@ from ..passes.missing_light.missing_light import MissingLight, find_missing_ligh
 from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
-from ..passes.unseen_light.unseen_light import Light, find_light, lit_by, with_sunlight
+from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera
 from ..scene.params import VISIBILITY
@@ -141,9 +141,9 @@ def with_sun_found(
         light_with_sun = find(
             lit_by_sun.with_light(sent), before=light, good=good & ~sunlit, sunlit=sunlit, measured=sun_fit.measured
         )
-        dark = dark.with_light(np.where(sunlit[:, None], sent, dark.radiance))
-        dark = with_sunlight(dark, sunlit, light_with_sun.sun)
-        return light_with_sun, dark.with_sun(sun_fit.times(light_with_sun.sun))
+        factor = light_with_sun.sun
+        dark = dark.with_light(np.where(sunlit[:, None], sent * np.float32(factor), dark.radiance))
+        return light_with_sun, dark.with_sun(sun_fit.times(factor))
     light_with_sun = find(lit_by_sun, before=light)
     if not len(light_with_sun.received):
         return light_with_sun, dark

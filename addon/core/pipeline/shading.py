@@ -191,7 +191,7 @@ def shade(
     kinds = lamp_kinds(mesh, instances, surface.noise)
     field, light, solved = with_all_light(Search(
         dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, cameras, patches,
-        atlas.object_id if whole is None else whole, lit_diffuse.seen[:, None] & lit_diffuse.lower_bounds(clip_colour),
+        atlas.object_id if whole is None else whole, lit_diffuse.lower_bounds(clip_colour),
     ))  # fmt: skip
     del dark
     field = field.with_unseen(None)  # the search for lamps alone asked for it

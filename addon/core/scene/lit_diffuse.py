@@ -45,7 +45,7 @@ class LitDiffuse:
         of the others it measures.
         """
         level = np.nan_to_num(self.radiance) / clip
-        return (self.clipped > 0.5)[:, None] & (level >= CLIPPED_TOO * level.max(1, keepdims=True))
+        return (self.seen & (self.clipped > 0.5))[:, None] & (level >= CLIPPED_TOO * level.max(1, keepdims=True))
 
     @property
     def seen(self) -> np.ndarray:
