@@ -206,12 +206,14 @@ def solve_for_some(
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """As `solve`; sources that are not `believed` keep their lower bound, and the others are solved for once more.
 
-    `believed` gives, of radiances and factor ((k + s, 3)), the sources that may have them, (k + s,) bool.
+    The elements lie evenly over the surface. `believed` gives, of radiances and factor ((k + s, 3)), which sources may
+    have them, (k + s,) bool.
     """
     free, radiance = np.ones(len(unknown.lower), bool), unknown.lower.copy()
     while True:
         held = unknown.part(~free)
-        radiance[free], spread = solve(sent, received + held.irradiance(held.lower), unknown.part(free), pairs)
+        under_held = received + held.irradiance(held.lower)
+        radiance[free], spread = solve(sent, under_held, unknown.part(free), pairs, np.ones(len(sent)))
         left = free & believed(radiance)
         if (left == free).all():
             return radiance, spread

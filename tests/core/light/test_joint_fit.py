@@ -75,9 +75,9 @@ def test_a_source_that_is_not_believed_keeps_what_was_measured_and_the_rest_make
     measured = np.full((2, 3), 0.5)
     unknown = Unknown(np.concatenate([by_lamp, by_highlight], 1), np.zeros((m, 0, 3)), measured, measured)
     pairs, received = rng.integers(0, m, (8 * m, 2)), np.ones((m, 3))
-    both, _ = solve(sent, received, unknown, pairs)
+    both, _ = solve(sent, received, unknown, pairs, np.ones(m))
     assert both[1].mean() > 10
-    alone, _ = solve(sent, received + 0.5 * by_highlight, unknown.part(np.array([True, False])), pairs)
+    alone, _ = solve(sent, received + 0.5 * by_highlight, unknown.part(np.array([True, False])), pairs, np.ones(m))
     found, _ = solve_for_some(sent, received, unknown, pairs, lambda radiance: np.array([True, radiance[1, 0] < 2]))
     assert (found[1] == 0.5).all() and found[0] == pytest.approx(alone[0])
     all_of_them, _ = solve_for_some(sent, received, unknown, pairs, lambda radiance: np.ones(2, bool))

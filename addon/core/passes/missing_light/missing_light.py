@@ -165,7 +165,7 @@ def find_missing_light(
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
-    in_sun = np.array([_mostly_lit(field, mask) for mask in masks], bool)
+    in_sun = np.array([mostly_lit(field, mask) for mask in masks], bool)
 
     def shines(of_lamp: np.ndarray) -> np.ndarray:
         """The patches that send clearly more than was measured, and not as the sun lights them, (p,) bool."""
@@ -216,7 +216,7 @@ def _daylight(radiance: np.ndarray) -> np.ndarray:
     return np.repeat((radiance @ LUMINANCE)[..., None], 3, -1)
 
 
-def _mostly_lit(field: LightField, mask: np.ndarray) -> bool:
+def mostly_lit(field: LightField, mask: np.ndarray) -> bool:
     """Whether the sun lights most of some elements, (n,) bool."""
     return 2 * from_sun(field, np.flatnonzero(mask)).any(1).sum() > mask.sum()
 
