@@ -1,9 +1,9 @@
 """The radiances of unknown sources, all together, under which albedo is most plausible.
 
 With E = E0 + sum s_k G_k, log albedo a = log(pi L_d / E) is to be alike where the surface is of one plane, which is
-robust against edges of paint (Land and McCann's Retinex in three dimensions), to be near a usual albedo, and not above
-what paint reflects. Colour is told by the light, which is white from outside. All radiances are solved for together, in
-log, by L-BFGS.
+robust against edges of paint (Land and McCann's Retinex in three dimensions), and not above what paint reflects; the
+brightest surface may be white paint. Colour is told by the light, which is white from outside. All radiances are solved
+for together, in log, by L-BFGS.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ..brdf.lambertian import TYPICAL_ALBEDO, WHITE_PAINT
+from ..brdf.lambertian import WHITE_PAINT
 from ..scene.params import COPLANAR
 from ..significance import LEVELS
 from .params import JOINT_FIT
@@ -124,9 +124,6 @@ class _NegativeLogPosterior:
             @ (difference / (1 + difference**2))
             / (JOINT_FIT.apart * max(len(difference), 1))
         )
-        offset = (a.mean(1) - np.log(TYPICAL_ALBEDO)) / JOINT_FIT.deviation
-        value += JOINT_FIT.level * 0.5 * float((offset**2).mean())
-        grad_a += (JOINT_FIT.level / (JOINT_FIT.deviation * channels * m) * offset)[:, None]
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
         excess = np.maximum(a - np.log(JOINT_FIT.highest), 0) / 0.1
         root = np.sqrt(1 + (excess / LEVELS.sigmas) ** 2)

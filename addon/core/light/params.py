@@ -146,26 +146,24 @@ class JointFitParams:
     """Of sources that are solved for together (`joint_fit`).
 
     Chosen on three phone-made rooms (a living room, a kitchen, a bathroom), by the PSNR of albedo at the sample, one
-    changed at a time from `sources` .2 and a usual albedo of .45, which give 18.28 dB in the mean: `sources` .1 18.67,
-    .4 17.98; that albedo .5 18.41; `level` .1 17.96; `unlike` 1 18.62; `highest` .8 18.23, a gain in the living room
-    and a loss in the bathroom. The sample alone tells too little: in eleven rooms `unlike` 1 gains .33 +- .08 dB there,
-    and in the pictures of seven -.10 +- .18.
+    changed at a time from `sources` .2, which give 18.28 dB in the mean: `sources` .1 18.67, .4 17.98; `unlike` 1
+    18.62; `highest` .8 18.23, a gain in the living room and a loss in the bathroom. The sample alone tells too little:
+    in eleven rooms `unlike` 1 gains .33 +- .08 dB there, and in the pictures of seven -.10 +- .18.
 
     Attributes
     ----------
     apart : float
         Difference of log albedo from which on two elements count as of two paints (Cauchy's scale). Seven phone-made
         rooms, in four of them two seeds: .07 gains .15 +- .13 dB over .1, .05 .28 +- .12, .035 .30 +- .14.
-    level : float
-        Weight of the prior on log albedo, normal about `TYPICAL_ALBEDO` with the deviation `deviation`.
-    deviation : float
     highest : float
         The greatest albedo of usual paint. What is above it counts in tenths of log albedo, by the square up to
         `LEVELS.sigmas` of them and linearly beyond (pseudo-Huber).
-    white : tuple of float
-        Quantiles of albedo over the surface between which it is likely that of white paint, within `deviation`, in
-        scans and where lamps or the sun's patch are clipped. In eight rooms (pixels, truth) the .97 quantile is .71 to
-        .82, and the geometric mean .19 to .46. Six phone-made scans, by texels, the light solved anew: +.17 +- .08 dB.
+    white, deviation : tuple of float, float
+        Quantiles of albedo over the surface between which it is likely that of white paint, within so much of its
+        logarithm, in scans and where lamps or the sun's patch are clipped. In eight rooms (pixels, truth) the .97
+        quantile is .71 to .82, and the geometric mean .19 to .46, which is why the mean tells nothing. Six phone-made
+        scans, by texels, the light solved anew: +.17 +- .08 dB. A prior on the mean beside it, normal about .5, then
+        gains -.04 +- .05 in eleven rooms.
     sources : float
         Weight of the prior that a source is as bright as expected: an opening shows daylight as bright as the room, a
         patch its clipped value, and a lamp is an exception (Student's t).
@@ -179,10 +177,9 @@ class JointFitParams:
     """
 
     apart: float = 0.05
-    level: float = 0.03
-    deviation: float = 0.5
     highest: float = 0.85
     white: tuple[float, float] = (0.95, 0.99)
+    deviation: float = 0.5
     sources: float = 0.1
     unlike: float = 0.5
     tint: float = 0.3
