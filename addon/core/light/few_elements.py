@@ -103,6 +103,11 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
 
 
+def mostly_lit(field: LightField, mask: np.ndarray) -> bool:
+    """Whether the sun lights most of some elements, (n,) bool."""
+    return 2 * from_sun(field, np.flatnonzero(mask)).any(1).sum() > mask.sum()
+
+
 def by_sun(
     field: LightField, radiance: np.ndarray, sunlit: np.ndarray, element: np.ndarray, seed: int, more: int = 1
 ) -> np.ndarray:

@@ -163,7 +163,7 @@ class JointFitParams:
         logarithm, in scans and where lamps or the sun's patch are clipped. In eight rooms (pixels, truth) the .97
         quantile is .71 to .82, and the geometric mean .19 to .46, which is why the mean tells nothing. Six phone-made
         scans, by texels, the light solved anew: +.17 +- .08 dB. A prior on the mean beside it, normal about .5, then
-        gains -.04 +- .05 in eleven rooms.
+        gains -.05 +- .04 in twelve captures.
     sources : float
         Weight of the prior that a source is as bright as expected: an opening shows daylight as bright as the room, a
         patch its clipped value, and a lamp is an exception (Student's t).

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, spread_over
+from ..light.few_elements import barely_seen, filled_radiance, from_sun, irradiance_at, mostly_lit, spread_over
 from ..light.field import LightField
 from ..light.lamps import Lamp, LampKinds
 from ..light.mirrors import Mirror
@@ -14,7 +14,7 @@ from ..light.openings import looked_out_by
 from ..light.sun import Sun
 from ..luminance import LUMINANCE
 from ..passes.clipped_lamps.patches import measured_patches
-from ..passes.missing_light.missing_light import MissingLight, find_missing_light, mostly_lit
+from ..passes.missing_light.missing_light import MissingLight, find_missing_light
 from ..passes.sun.clipped_sunlight import with_clipped_sunlight
 from ..passes.sun.params import SUN
 from ..passes.sun.sun_fit import find_sun
@@ -193,7 +193,7 @@ def with_missing_light(
     if solved is None:
         return lit_field, light_found, missing.shut
     bound, sunlit, dark = dark.radiance, np.zeros(len(clipped), bool), dark.with_sun(solved.sun)
-    # What is far brighter than the room, but for the sun's sake, is no lamp.
+    # What is far brighter than the room because the sun lights it is no lamp.
     measured = [patch for patch in measured if not mostly_lit(dark, dark.atlas.object_id == patch)]
     if "clipped-sunlight" not in search.without:
         dark = dark.with_light(with_clipped_sunlight(dark, clipped, element, received, whole))

@@ -11,7 +11,7 @@ import numpy as np
 from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import by_sun, filled_radiance, from_sun, irradiance_at, spread_over
+from ...light.few_elements import by_sun, filled_radiance, irradiance_at, mostly_lit, spread_over
 from ...light.field import LightField
 from ...light.joint_fit import Unknown, in_one_plane, solve_for_some
 from ...light.lamps import Lamp, find_seen
@@ -214,11 +214,6 @@ def _prominent(contribution: np.ndarray, radiance: np.ndarray, irradiance: np.nd
 def _daylight(radiance: np.ndarray) -> np.ndarray:
     """Of the luminance of some radiances ((..., 3)), white: nothing comes from outside that is as warm as a room."""
     return np.repeat((radiance @ LUMINANCE)[..., None], 3, -1)
-
-
-def mostly_lit(field: LightField, mask: np.ndarray) -> bool:
-    """Whether the sun lights most of some elements, (n,) bool."""
-    return 2 * from_sun(field, np.flatnonzero(mask)).any(1).sum() > mask.sum()
 
 
 def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:

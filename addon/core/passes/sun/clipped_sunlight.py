@@ -32,7 +32,8 @@ def with_clipped_sunlight(
     radiance = field.radiance.copy()
     known = ~clipped[element] & (radiance[element] > 0).all(1)
     element, received = element[known], received[known]
-    albedo = np.pi * radiance[element] / np.maximum(received + from_sun(field, element), 1e-12)
+    E = received + from_sun(field, element)
+    albedo = np.minimum(np.pi * radiance[element] / np.maximum(E, 1e-12), 1)
     sunlit = np.flatnonzero(clipped)
     sunlight = from_sun(field, sunlit)
     sunlit, sunlight = sunlit[sunlight.any(1)], sunlight[sunlight.any(1)]
@@ -41,7 +42,6 @@ def with_clipped_sunlight(
         own = of_object.get(number, element[:0])
         if len(own) < LEVELS.few:
             continue
-        mean_albedo = np.minimum(albedo[own], 1).mean(0)
-        reflected = mean_albedo * (sunlight[members] + np.median(received[own], 0)) / np.pi
+        reflected = albedo[own].mean(0) * (sunlight[members] + np.median(received[own], 0)) / np.pi
         radiance[sunlit[members]] = np.maximum(radiance[sunlit[members]], reflected)
     return radiance
