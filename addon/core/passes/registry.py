@@ -89,7 +89,6 @@ PASSES = (
         interpolation="Gathers irradiance at few points and interpolates between them.",
         lamp_noise="Takes the noise of rays and of interpolation out of the irradiance.",
         crease_error="Counts irradiance beside creases as less certain.",
-        tilt_error="Counts irradiance on triangles that noise has turned as less certain.",
         unseen_surfaces="Lets what no frame sees reflect like the rest of its object.",
     ),
     *_passes_of(
@@ -115,7 +114,6 @@ PASSES = (
         albedo_prior="Shrinks uncertain albedo towards its neighbourhood's.",
         second_colour="Shrinks it to a second colour of the neighbourhood where that is likelier.",
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
-        class_albedo="Shrinks the albedo of objects of one class towards one another's.",
         object_spread="Takes the spread of single observations from others of the object.",
         texture_fill="Gives what is filled in the texture of its plane's measured part.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",

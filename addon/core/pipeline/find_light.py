@@ -37,8 +37,6 @@ class Search:
         As the frames show it, without lamps; dark where no frame saw it.
     find_mirrors, shining, cameras, patches
         As in `shade`.
-    tilted : (n,) float
-        `turned_by_noise`.
     whole : (n,) int
         The object of each element before `patches` were set apart.
     lower : (n, 3) bool
@@ -50,7 +48,6 @@ class Search:
     kinds: LampKinds
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None
     seed: int
-    tilted: np.ndarray
     shining: Mapping[int, np.ndarray]
     without: Collection[str]
     cameras: Sequence[Camera]
@@ -78,7 +75,7 @@ def with_all_light(search: Search) -> tuple[LightField, Light, np.ndarray]:
     # Mirrors first: what is opposite or over one gets light by it, which would otherwise be attributed to lamps.
     field = dark.with_mirrors(find_mirrors(dark, None) if find_mirrors else ())
     find = partial(
-        find_light, good=good, unseen_objects=unseen, kinds=search.kinds, seed=search.seed, tilted=search.tilted,
+        find_light, good=good, unseen_objects=unseen, kinds=search.kinds, seed=search.seed,
         shining=search.shining, without=without,
     )  # fmt: skip
     light = find(field)

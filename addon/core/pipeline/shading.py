@@ -24,14 +24,11 @@ from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
 from ..progress import Progress
 from ..results.values import kinds_of
-from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.mesh_noise import tilt
-from ..scene.model import Camera, Capture, Instance, Mesh
+from ..scene.model import Camera, Capture, Instance
 from ..scene.patches import Patches
 from ..scene.surface import Surface
-from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN
 from ..settings import Settings
 from .find_light import Search, with_all_light
@@ -180,7 +177,6 @@ def shade(
         "seed": seed,
     }
     find_mirrors = None if "mirrors" in without else find_mirrors
-    tilted = np.zeros(len(atlas)) if "tilt-error" in without else turned_by_noise(mesh, atlas, surface.noise)
 
     environment, sun = (environment, None) if "seen-sun" in without else extract_sun(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
@@ -190,7 +186,7 @@ def shade(
         dark = with_unseen_by_light(dark, clean, **gathering)
     kinds = lamp_kinds(mesh, instances, surface.noise)
     field, light, solved = with_all_light(Search(
-        dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without, cameras, patches,
+        dark, lit_diffuse, kinds, find_mirrors, seed, shining, without, cameras, patches,
         atlas.object_id if whole is None else whole, lit_diffuse.lower_bounds(clip_colour),
     ))  # fmt: skip
     del dark
@@ -211,8 +207,6 @@ def shade(
         portal_rays=0 if "portal-rays" in without else settings.portal_rays,
         interpolate=settings.interpolate and "interpolation" not in without, progress=progress, **gathering,
     )  # fmt: skip
-    # A noisy mesh faces elsewhere than the surface did.
-    error = np.hypot(error, tilted)
     # Near a crease the light of two sides is mixed.
     if "crease-error" not in without:
         error = np.hypot(error, crease_error(mesh, atlas, atlas.texel_edge))
@@ -220,9 +214,3 @@ def shade(
         E, escaped, error, field.radiance, light.lamps, field.environment, light.notes, field.mirrors, points,
         field.sun, field.openings,
     )  # fmt: skip
-
-
-def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
-    """Radians by which `noise` metres in the vertices may have turned each element, (n,) float."""
-    single, sheet = fronts(mesh)
-    return tilt(single, noise)[sheet[atlas.triangle]]

@@ -185,13 +185,9 @@ class NoiseParams:
     ----------
     least_noise : float
         Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
-    left : float
-        Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the
-        median, 0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong.
     """
 
     least_noise: float = 0.001
-    left: float = 0.5
 
 
 NOISE = NoiseParams()

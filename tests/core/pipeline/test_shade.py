@@ -17,7 +17,7 @@ from addon.core.scene.model import Frame
 from addon.core.settings import Settings
 from tests.core.on_disk import ALBEDO, EYES, LAMP
 from tests.core.pipeline.test_light import measured
-from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, quad, radiosity, split
+from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, radiosity
 
 
 @pytest.fixture(scope="module")
@@ -123,19 +123,3 @@ def test_a_mesh_without_objects_of_which_frames_saw_next_to_nothing_is_shaded():
     how, whole = Settings(shading_rays=16, threads=2), room.atlas.object_id
     result = shade(room.surface, room.instances, part, DARK, how, patches=[], whole=whole)
     assert np.isfinite(result.irradiance).all() and result.openings is None
-
-
-def test_light_on_a_scanned_mesh_is_less_certain_unless_that_is_left_out():
-    """A floor that is off by 4 mm from vertex to vertex, 10 cm apart: its triangles face any way by some degrees."""
-    room = make_room(split(quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), 20), 0.1)
-    _, place = np.unique(np.round(room.mesh.vertices, 6), axis=0, return_inverse=True)
-    height = np.random.default_rng(0).normal(0, 0.004, place.max() + 1)[place.ravel()]
-    vertices = room.mesh.vertices + height[:, None] * np.array([0, 0, 1.0])
-    scan = replace(room.surface, mesh=replace(room.mesh, vertices=vertices))
-    found = measured(room, np.ones((len(room.atlas), 3)))
-    how = Settings(shading_rays=16, threads=2)
-    unsure, left_out = (
-        shade(scan, room.instances, found, DARK, replace(how, without=without)).relative_error
-        for without in (("crease-error",), ("crease-error", "tilt-error"))
-    )
-    assert np.median(unsure) > np.median(left_out) + 0.03

@@ -1,7 +1,7 @@
 """Albedo = pi L_d / E, and what stands in where nothing was seen."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ...scene.model import Instance, class_names
 from ...significance import SIGMA_OF_MAD
 from .bias_field import without_bias
 from .neighbourhood import References, relative_error, shrink, well_measured
-from .of_class import shrunk_to_class
 from .params import ALBEDO, MAX_ALBEDO
 
 MEASURED: Code[int] = 2
@@ -89,7 +88,7 @@ def albedo_of(
     emitters: set[int],
     without: Collection[str] = (),
 ) -> Albedo:
-    """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`), to others of its class as well (`of_class`).
+    """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`).
 
     Parameters
     ----------
@@ -108,12 +107,7 @@ def albedo_of(
     if "bias-field" not in without:
         rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))
     guesses = {instance.object_id for instance in instances if instance.guess}
-    albedo = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses, irradiance_error)
-    if "class-albedo" in without:
-        return albedo
-    class_of = class_names(instance for instance in instances if not instance.guess)
-    shrunk = shrunk_to_class(atlas, albedo.rho, albedo.origin == MEASURED, class_of)
-    return replace(albedo, rho=np.minimum(shrunk, MAX_ALBEDO))
+    return fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses, irradiance_error)
 
 
 def fill(

@@ -64,23 +64,6 @@ class SecondColourParams:
 
 
 @dataclass(frozen=True)
-class ClassPriorParams:
-    """Of `of_class` (`class-albedo` in the ablation).
-
-    Attributes
-    ----------
-    of_place : float
-        Relative standard error that E has in common over a square metre: ten rooms have .02 to .06, as their large
-        objects' albedo varies between places.
-    most : float
-        That of an object however small.
-    """
-
-    of_place: float = 0.0354
-    most: float = 0.2
-
-
-@dataclass(frozen=True)
 class BiasParams:
     """Of `bias_field` (`bias-field` in the ablation).
 
@@ -112,7 +95,6 @@ class BiasParams:
 PRIOR = PriorParams()
 BIAS = BiasParams()
 SECOND_COLOUR = SecondColourParams()
-CLASS_PRIOR = ClassPriorParams()
 
 
 @dataclass(frozen=True)

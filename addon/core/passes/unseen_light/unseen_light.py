@@ -101,7 +101,6 @@ def find_light(
     unseen_objects: list[int],
     kinds: LampKinds,
     seed: int = 0,
-    tilted: np.ndarray | None = None,
     shining: Mapping[int, np.ndarray] = MappingProxyType({}),
     before: Light | None = None,
     without: Collection[str] = (),
@@ -119,8 +118,6 @@ def find_light(
         Elements whose L_d rests on enough clean observations, saturated ones included.
     unseen_objects : list of int
         Objects of which no frame saw anything.
-    tilted : (n,) float, optional
-        Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
     shining : mapping of int to (3,) float64
         Of the unseen objects, those that surely are lamps, and the radiance that each has at least.
     before : Light, optional
@@ -136,8 +133,6 @@ def find_light(
     if before is not None:
         field, unseen_objects = before.without_mixed(field), [*unseen_objects, *mixed]
     flat = on_flat(field.atlas)
-    if tilted is not None:
-        flat &= tilted < np.arccos(LIGHT_FIT.flat)
     usable = steady(field, good, flat) | barely_seen(field, good)
     # What a mirror shows is no albedo.
     usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
@@ -170,7 +165,7 @@ def find_light(
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
             mixed_light = Light((), original.environment, (), element, filled, mixed=mixed)
-            return find_light(original, good, unseen_objects, kinds, seed, tilted, shining, mixed_light, without)
+            return find_light(original, good, unseen_objects, kinds, seed, shining, mixed_light, without)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
