@@ -141,15 +141,17 @@ def test_a_zones_mean_is_what_was_solved():
         assert 1.2 < level.max() / level.min() <= 9
 
 
-def test_a_side_that_frames_clipped_is_one_unknown_with_the_rest_of_it():
+def test_a_side_that_frames_clipped_is_one_unknown_with_the_rest_of_it_but_for_a_band_above_the_horizon():
     """Above the horizon all that frames saw is clipped; below it a few cells are, beside more that are told."""
     seen, clipped = np.zeros((16, 32), np.int32), np.zeros((16, 32), bool)
     seen[10, 4:8], clipped[10, 4:8] = 3, True
     seen[5, 4:8], clipped[5, 4] = 3, True
     environment = Environment(np.ones((16, 32, 3), np.float32), seen, clipped)
-    above, below, rest = environment.unknown_zones()
-    assert above.clipped and not below.clipped and rest.clipped
-    assert (above.weight[10, 4:8] == 1).all() and above.weight[8:].min() > 0 and not above.weight[:8].any()
+    band, above, below, rest = environment.unknown_zones()
+    assert band.clipped and above.clipped and not below.clipped and rest.clipped
+    assert (above.weight[10, 4:8] == 1).all() and not (band.weight * above.weight).any()
+    both = band.weight + above.weight
+    assert both[8:].min() > 0 and not both[:8].any() and band.weight[8].all() and above.weight[15].all()
     assert not below.weight[5, 4:8].any() and below.measured
     assert rest.weight.sum() == rest.weight[5, 4] == 1
 

@@ -9,6 +9,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from addon.core.light.emitters import bright_triangles
+from addon.core.light.environment import Environment
+from addon.core.light.few_elements import irradiance_at
 from addon.core.light.lamps import Lamp, find_seen
 from addon.core.light.mirrors import Mirror
 from addon.core.luminance import LUMINANCE
@@ -281,3 +283,28 @@ def test_a_lamp_says_how_it_was_found():
         ),
     }
     assert all(lamp.note(names) == sentence for sentence, lamp in told.items())
+
+
+@pytest.mark.parametrize(("zenith", "horizon"), [(8, 24), (18, 6), (10, 10)])
+def test_a_clipped_sky_lights_the_room_as_it_does_whether_it_is_clear_or_overcast(zenith, horizon):
+    """Low light reaches deep into a room that is open at one end; frames clip all of it."""
+    size, seed = 32, 0
+    room = make_room([side for side in box_sides((5.0, 3.0, 2.5)) if side.object_id != 3], 0.2)
+    elevation = np.degrees(((np.arange(size) + 0.5) / size - 0.5) * np.pi)
+    level = np.where(elevation < 0, 2.0, zenith + (horizon - zenith) * np.exp(-elevation / 15))
+    sky = np.broadcast_to(level[:, None, None], (size, 2 * size, 3)).astype(np.float32)
+    frames = np.ones((size, 2 * size), np.int32)
+    shining, every = Environment(sky, frames), np.arange(len(room.atlas))
+    rho = np.array([ALBEDO[i] * np.ones(3) for i in range(6)])[room.atlas.object_id]
+    L = np.zeros((len(every), 3), np.float32)
+    for _ in range(6):
+        E = irradiance_at(room.field(L).with_light(L, shining), every, 9, 4)
+        L = (rho * E / np.pi).astype(np.float32)
+    clipped = np.broadcast_to(elevation[:, None] > 0, frames.shape)
+    bound = Environment(np.where(clipped[..., None], np.float32(3), sky), frames, clipped)
+    settings = Settings(shading_rays=256, emitter_rays=16, threads=2, seed=seed)
+    found = shade(room.surface, room.instances, measured(room, L, texture=0.1, seed=seed), bound, settings)
+    ratio = (found.irradiance @ LUMINANCE) / (E @ LUMINANCE)
+    deep = room.atlas.position[:, 0] < 2
+    assert np.median(ratio[deep]) / np.median(ratio[~deep]) == pytest.approx(1, abs=0.06)
+    assert np.quantile(np.abs(np.log(ratio / np.median(ratio))), 0.9) < 0.15
