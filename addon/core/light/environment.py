@@ -181,23 +181,22 @@ class Environment:
     def unknown_zones(self) -> list[Zone]:
         """The directions above and below the horizon that frames don't show; last, what of the rest they clipped.
 
-        The weight is `strange`. Within a zone radiance goes with the height as it does where the
-        frames saw it: skies change more with the height than around. Where frames clipped most of what they saw on a
-        side, that and the unseen are one zone, as unknowns that light a room alike can't be told apart, but for a band
-        above the horizon, which reaches deepest into a room.
+        The weight is `strange`. Within a zone radiance goes with the height as it does where the frames saw it: skies
+        change more with the height than around. Where frames clipped most of what they saw on a side, that and the
+        unseen are one zone, as unknowns that light a room alike can't be told apart, but for a band above the horizon,
+        which reaches deepest into a room.
         """
         weight, height = self.strange, len(self.observations)
-        above = (np.arange(height) >= height / 2)[:, None]
-        profile = self._profile()[:, None]
-        band = above & (np.arange(height) < (0.5 + SKY.band / 180) * height)[:, None]
+        row, profile = np.arange(height)[:, None], self._profile()[:, None]
+        above, low = row >= height / 2, row < (0.5 + SKY.band / 180) * height
         zones: list[Zone] = []
         remaining = self.clipped
-        for side, parts in ((above, (band, above & ~band)), (~above, (~above,))):
+        for side in (above, ~above):
             zone_weight, known = np.where(side, weight, np.float32(0)), self.measured & side
             if _by_solid_angle(self.clipped & side).sum() > _by_solid_angle(known).sum():
                 zone_weight, remaining = np.where(side & self.clipped, np.float32(1), zone_weight), remaining & ~side
-                of_parts = [np.where(part, zone_weight, np.float32(0)) for part in parts]
-                zones.extend(Zone(of_part, of_part, clipped=True) for of_part in of_parts if of_part.any())
+                parts = [np.where(part, zone_weight, np.float32(0)) for part in (low, ~low)]
+                zones.extend(Zone(part, part, clipped=True) for part in parts if part.any())
             elif zone_weight.any():
                 zones.append(Zone(zone_weight, _levelled(zone_weight * profile, zone_weight), bool(known.any())))
         if remaining.any():

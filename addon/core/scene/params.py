@@ -178,22 +178,6 @@ CREASES = CreaseParams()
 
 
 @dataclass(frozen=True)
-class NoiseParams:
-    """A scan's noise (`mesh_noise`).
-
-    Attributes
-    ----------
-    least_noise : float
-        Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
-    """
-
-    least_noise: float = 0.001
-
-
-NOISE = NoiseParams()
-
-
-@dataclass(frozen=True)
 class SurfaceParams:
     """How the surface is laid out in texels, and its parts are told apart.
 

@@ -26,7 +26,6 @@ from scipy.sparse.linalg import cg
 
 from ...scene.mesh_noise import noise_of
 from ...scene.model import Mesh
-from ...scene.params import NOISE
 from ...scene.weld import one_place, point_normals, ring_of, welded
 from ...significance import LEVELS
 from .params import DENOISE
@@ -123,7 +122,7 @@ def _large(points: np.ndarray, faces: np.ndarray, min_size: float) -> np.ndarray
 def without_noise(mesh: Mesh, without: Collection[str] = ()) -> tuple[Mesh, float]:
     """The mesh denoised, and the noise that was found; one with too little to tell from shape is given back itself."""
     noise = noise_of(mesh)
-    if noise < NOISE.least_noise:
+    if noise < DENOISE.least_noise:
         return mesh, 0.0
     return replace(mesh, vertices=denoised(mesh, noise, without)), noise
 

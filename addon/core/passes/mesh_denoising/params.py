@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DenoiseParams:
-    """Of `denoise` and, but for the first, of `planes` (`mesh-denoising` and `sheets` in the ablation).
+    """Of `denoise` and, but for the first two, of `planes` (`mesh-denoising` and `sheets` in the ablation).
 
     Attributes
     ----------
+    least_noise : float
+        Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
     tolerance : float
         Of each linear solve, by conjugate gradients.
     reach : float
@@ -38,6 +40,7 @@ class DenoiseParams:
         How much firmer a sheet holds its points than the denoised places do, as a ratio of standard deviations.
     """
 
+    least_noise: float = 0.001
     tolerance: float = 1e-3
     reach: float = 4.5
     turn: float = 0.15
