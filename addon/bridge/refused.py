@@ -41,6 +41,13 @@ def whole_folder(folder: Path, what: str) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
+def check_backslash(folder: Path, advice: str) -> None:
+    """Raise `BadInputError` for a folder to write with a backslash in its path, which Blender takes for a slash."""
+    if os.sep == "/" and "\\" in str(folder.absolute()):
+        what = "has a backslash in its path, which Blender takes for a slash"
+        raise BadInputError(f"Result folder '{folder.absolute()}' {what}; {advice}.")
+
+
 def sentences(*remarks: tuple[list[str], str]) -> tuple[str, ...]:
     """One sentence for each remark, naming all objects that it is about; remarks without objects are left out."""
     return tuple(f"Object{'s' if len(names) > 1 else ''} {listed(names)}: {what}." for names, what in remarks if names)

@@ -105,8 +105,12 @@ def make_parser() -> argparse.ArgumentParser:
         add(commands)
     if importlib.util.find_spec("..farm", __package__):  # the extension's zip has none
         from ..farm.commands import add_farm
+        from ..farm.divide import add_divide
+        from ..farm.join import add_join
 
         add_farm(commands)
+        add_divide(commands)
+        add_join(commands)
     return parser
 
 

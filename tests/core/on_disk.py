@@ -42,13 +42,13 @@ def write_mesh(root: Path, vertices: np.ndarray, faces: np.ndarray, ids: np.ndar
 class OnDisk:
     """A room, its pictures and the capture they are written to. `shift` moves all of it away from the origin."""
 
-    def __init__(self, root: Path, quads=None, shift=(0.0, 0.0, 0.0), light=None, outside=0.0):
+    def __init__(self, root: Path, quads=None, shift=(0.0, 0.0, 0.0), light=None, outside=0.0, eyes=EYES):
         self.root = root
         (root / "images").mkdir(parents=True)
         self.room = make_room(quads or lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.1)
         self.light = radiosity(self.room, ALBEDO, {6: LAMP}) if light is None else light(self.room)
         self.shift = np.array(shift)
-        cameras = [c for eye in EYES for c in all_round(eye, 40)]
+        cameras = [c for eye in eyes for c in all_round(eye, 40)]
         entries = []
         for i, camera in enumerate(cameras):
             pose = camera.camera_to_world.copy()

@@ -1,6 +1,8 @@
 """Images: the result folder's EXR files as Blender images, and arrays as generated ones."""
 
 import os
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -83,6 +85,16 @@ def load_parts(
     return {number: images[file] for number, file in files.items()}
 
 
+def mark_appended(images: Iterable[bpy.types.Image], folder: Path) -> list[bpy.types.Image]:
+    """Mark (`custom_properties.IMAGE`) where in a result folder the images of its scene.blend lie; returns them."""
+    loaded = [image for image in images if image.source in ("FILE", "TILED") and image.filepath]
+    for image in loaded:
+        path = Path(image.filepath.replace("\\", "/"))
+        is_part = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
+        image[IMAGE] = str(folder / path.parent.name / path.name if is_part else folder / path.name)
+    return loaded
+
+
 def image_name(room: str, path: Path | str) -> str:
     """Blender's name for an image file of a room: 'kitchen base color', to distinguish two rooms in one file."""
     label = Path(path).stem.replace("_", " ")
@@ -91,7 +103,8 @@ def image_name(room: str, path: Path | str) -> str:
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:
     """Give an image a path from the .blend's folder (``//``), so that both can be moved together; not across drives."""
-    image.filepath = bpy.path.relpath(image.filepath, start=str(Path(folder).absolute())).replace(os.sep, "/")
+    with suppress(ValueError):  # another drive
+        image.filepath = bpy.path.relpath(image.filepath, start=str(Path(folder).absolute())).replace(os.sep, "/")
 
 
 def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> bpy.types.Image:

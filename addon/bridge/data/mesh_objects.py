@@ -17,6 +17,8 @@ PARTS_UV = "ScanRelightParts"
 """Of those for images of single objects, or UDIM tiles; absent where one image serves the room."""
 CAPTURE_UV = "Capture"
 """Name of the capture's own texture coordinates, where it has any."""
+FAR = "scan_relight_far"
+"""Name of the faces' attribute that is true of those of other parts of a building (`Mesh.far`); absent without any."""
 
 
 def by_object(mesh: Mesh, instances: Iterable[Instance]) -> dict[int, list[Instance]]:
@@ -78,6 +80,8 @@ def each_object(
         if len(parts) > 1:
             slots = np.repeat(np.arange(len(parts), dtype=np.int32), list(map(len, of_parts)))
             data.polygons.foreach_set("material_index", slots)
+        if mesh.far is not None and mesh.far[indices].any():
+            data.attributes.new(FAR, "BOOLEAN", "FACE").data.foreach_set("value", mesh.far[indices])
         layer = data.uv_layers[ATLAS_UV if parts_uv is None else PARTS_UV]
         data.uv_layers.active, layer.active_render = layer, True
         obj = bpy.data.objects.new(parts[0].name, data)

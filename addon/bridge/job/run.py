@@ -1,6 +1,5 @@
 """A whole run, capture in, result folder out, and a few objects fitted again: what command line and operators call."""
 
-import os
 import time
 from collections.abc import Collection
 from dataclasses import replace
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import BadInputError
 from ...core.io.folder import REPORT, SCENE
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
@@ -24,6 +22,7 @@ from ...core.stages import READ, WRITE
 from ...version import VERSION
 from ..data.unwrap import unwrap
 from ..own_scene.capture import polygons_of
+from ..refused import check_backslash
 from ..scene.write import write_scene
 
 REFIT_WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
@@ -46,11 +45,7 @@ def run(
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     request.check(capture_folder, out_folder)
-    if os.sep == "/" and "\\" in str(out_folder.absolute()):
-        raise BadInputError(
-            f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
-            "choose one without, or run with --no-scene."
-        )
+    check_backslash(out_folder, "choose one without, or run with --no-scene")
     started = time.monotonic()
     progress.stage(READ)
     capture = read_capture(capture_folder, request.reading)

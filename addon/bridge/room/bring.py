@@ -10,16 +10,27 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import BadInputError, MissingStageError
+from ...core.errors import MissingStageError
 from ...core.io.folder import SCENE
 from ...core.results.room_file import ROOM, root_of, run_of
-from ..custom_properties import IMAGE, OWN_SCENE, RESULT, UV_MAP, set_run
+from ..custom_properties import IMAGE, OWN_SCENE, RESULT, set_run
 from ..data.added import AddedData
 from ..data.cameras import show_camera
+from ..data.images import mark_appended
 from ..results import changes as room_changes
 from ..results import images
 from ..scene.as_made import stamp, stamp_tree
-from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, rooms, scene_name, take_settings
+from ..scene.parts import (
+    dress,
+    find_room,
+    hide_cameras,
+    imported,
+    load_scene,
+    own_scene,
+    rooms,
+    scene_name,
+    take_settings,
+)
 from .update import Steps, commit, note_known, plan
 
 
@@ -76,7 +87,7 @@ def bringing(
     is_new, steps, added = top is None, Steps(), AddedData()
     try:
         yield 0.0
-        shell = _append(folder / SCENE)
+        shell = load_scene(folder / SCENE)
         yield 0.4
         fresh = next(iter(rooms(shell)), shell.collection.children[0])  # an older one is not marked
         run = run_of(folder)
@@ -93,7 +104,7 @@ def bringing(
         if not is_new:
             steps = yield from plan(top, fresh)
         yield 0.95
-        images.settle(_images(added, folder), where)
+        images.settle(mark_appended(added.new("images"), folder), where)
         for name in (images.ALBEDO, images.SHADING):  # shown by nothing yet, but asked for by name
             if (folder / name).exists():
                 images.image(folder, name, where)
@@ -125,31 +136,6 @@ def ready(scene: bpy.types.Scene) -> None:
     if scene.camera is not None:
         show_camera(scene, scene.camera)
     scene.view_layers[0].update()
-
-
-def _append(path: Path) -> bpy.types.Scene:
-    """The scene of a result's scene.blend, appended by Blender itself."""
-    if not path.is_file():
-        raise MissingStageError(f"Folder '{path.parent}' holds no {path.name}; run the recovery to its end first.")
-    try:
-        with bpy.data.libraries.load(str(path), link=False) as (data_from, data_to):
-            data_to.scenes = data_from.scenes[:1]
-    except OSError as error:
-        raise BadInputError(
-            f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from its last stage."
-        ) from error
-    if not data_to.scenes or data_to.scenes[0] is None or not data_to.scenes[0].collection.children:
-        raise BadInputError(f"'{path}' holds no room; run the recovery again from its last stage.")
-    return data_to.scenes[0]
-
-
-def _images(added: AddedData, folder: Path) -> list[bpy.types.Image]:
-    loaded = [image for image in added.new("images") if image.source in ("FILE", "TILED") and image.filepath]
-    for image in loaded:
-        path = Path(image.filepath.replace("\\", "/"))
-        is_part = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
-        image[IMAGE] = str(folder / path.parent.name / path.name if is_part else folder / path.name)
-    return loaded
 
 
 def _replace_images(added: AddedData, top: bpy.types.Collection) -> None:

@@ -14,7 +14,7 @@ from mathutils import Matrix
 from ..custom_properties import OBJECT_ID
 from ..data.arrays import faces_of, vertices_of
 from ..data.materials import MODEL
-from ..data.mesh_objects import ATLAS_UV, CAPTURE_UV
+from ..data.mesh_objects import ATLAS_UV, CAPTURE_UV, FAR
 from ..data.names import split_number
 from ..light import lamps, outside
 
@@ -27,7 +27,7 @@ SHAPE = "scan_relight_shape"
 WRITTEN = "scan_relight_written"
 """Of a material or world: its nodes' values and links when it was made, as JSON; no digest, as another version of
 Blender may add sockets."""
-_BUILT_IN = {"position", "sharp_face", "sharp_edge", "material_index", ATLAS_UV, CAPTURE_UV}
+_BUILT_IN = {"position", "sharp_face", "sharp_edge", "material_index", ATLAS_UV, CAPTURE_UV, FAR}
 
 
 def stamp(obj: bpy.types.Object, name: str | None = None) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import MissingStageError
+from ...core.errors import BadInputError, MissingStageError
 from ..custom_properties import CAPTURE, OWN_SCENE
 from ..light import outside
 from ..render_device import preferences_of_cycles
@@ -40,6 +40,25 @@ def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
             layer_collections.extend(layer_collection.children)
             if layer_collection.collection == part != top:
                 layer_collection.hide_viewport = True
+
+
+def load_scene(path: Path, link: bool = False) -> bpy.types.Scene:
+    """The scene of a result's scene.blend, appended by Blender itself, or linked.
+
+    Raises `MissingStageError` or `BadInputError`: there is none, or it can't be read.
+    """
+    if not path.is_file():
+        raise MissingStageError(f"Folder '{path.parent}' holds no {path.name}; run the recovery to its end first.")
+    try:
+        with bpy.data.libraries.load(str(path), link=link) as (data_from, data_to):
+            data_to.scenes = data_from.scenes[:1]
+    except OSError as error:
+        raise BadInputError(
+            f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from its last stage."
+        ) from error
+    if not data_to.scenes or data_to.scenes[0] is None or not data_to.scenes[0].collection.children:
+        raise BadInputError(f"'{path}' holds no room; run the recovery again from its last stage.")
+    return data_to.scenes[0]
 
 
 def scene_name(capture_folder: Path | str) -> str:

@@ -85,7 +85,7 @@ def _build(
     track = make_track(cameras, camera_collection)
     scene.world = make_world("Scan Relight", images.get(ENVIRONMENT))
     stamp_tree(scene.world)
-    _prepare(scene, median_radiance)
+    prepare(scene, median_radiance)
     if cameras:
         use_camera(scene, cameras[best_view(capture.frames, capture.mesh)])
     else:
@@ -132,6 +132,12 @@ def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.ty
     return panels
 
 
+def start_empty() -> None:
+    """Start from an empty file; what is open in this process is lost."""
+    # Not read_factory_settings: that would disable the running extension itself.
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
 def write_scene(
     path: Path | str,
     capture: Capture,
@@ -176,14 +182,13 @@ def write_scene(
     """
     path = Path(path).absolute()
     if fresh:
-        # Not read_factory_settings: that would disable the running extension itself.
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        start_empty()
     with nullcontext((bpy.context.scene, None)) if fresh else scene_apart("Scan Relight") as (scene, _):
         folder = Path(result_folder).absolute()
         images, warnings = _build(scene, capture, atlas_uv, materials, folder, median_radiance, parts)
         for image in images:
             relative_to(image, path.parent)
-        _save_whole(path, scene, images, fresh)
+        save_whole(path, scene, images, fresh)
     return warnings
 
 
@@ -196,7 +201,8 @@ def _save(name, scene, images, fresh):
         bpy.data.libraries.write(name, {scene, *images}, path_remap="NONE", compress=True, fake_user=False)
 
 
-def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image], fresh: bool) -> None:
+def save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image], fresh: bool) -> None:
+    """Save the open file, or where it is not `fresh` a scene and images of it; raises `StorageError`."""
     writing = path.parent / _WRITING
     try:
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
@@ -214,7 +220,7 @@ def _save_whole(path: Path, scene: bpy.types.Scene, images: list[bpy.types.Image
             writing.unlink(missing_ok=True)
 
 
-def _prepare(scene, median_radiance):
+def prepare(scene: bpy.types.Scene, median_radiance: float = 0.0) -> None:
     """Cycles, and an exposure that shows the room's median radiance as middle grey."""
     scene.render.engine = "CYCLES"
     scene.cycles.samples = 128

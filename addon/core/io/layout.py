@@ -100,6 +100,8 @@ class RawMesh:
         In the file; '' for none.
     faces : Faces or None
         None: each triangle is a face of the file, and the vertices are its own.
+    far : (t,) bool or None
+        As in `Mesh`.
     """
 
     vertices: np.ndarray
@@ -112,6 +114,7 @@ class RawMesh:
     material: np.ndarray | None = None
     material_names: tuple[str, ...] = ()
     faces: Faces | None = None
+    far: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

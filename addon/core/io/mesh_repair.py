@@ -6,6 +6,8 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Limit, Unit
+from ..parallel import blocks
+from ..scene.model import TRIANGLES_AT_ONCE
 from .layout import RawMesh
 
 MAX_COORDINATE: Limit[float] = 1e6
@@ -55,17 +57,23 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
         vertices, triangles = vertices[finite], new_index[triangles].astype(np.int32)
     ids = None if mesh.object_id is None else mesh.object_id[good]
     uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[good], nan=0.0, posinf=0.0, neginf=0.0)
-    extent = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
+    used = np.zeros(len(vertices), bool)
+    used[triangles] = True
+    extent = float(np.ptp(vertices[used], axis=0).max())
     if not PLAUSIBLE_EXTENT[0] <= extent <= PLAUSIBLE_EXTENT[1]:
         warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
     lit = None if mesh.lit is None else mesh.lit.part(good)
-    kept = {"vertices": vertices, "triangles": triangles, "object_id": ids, "uv": uv, "lit": lit}
+    far = None if mesh.far is None else mesh.far[good]
+    kept = {"vertices": vertices, "triangles": triangles, "object_id": ids, "uv": uv, "lit": lit, "far": far}
     return replace(mesh, **kept, material=None, faces=None), warnings
 
 
 def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Whether each triangle has three corners apart from one line, (t,) bool."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest_squared = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
-    return doubled_area > MIN_HEIGHT * longest_squared
+    result = np.empty(len(triangles), bool)
+    for part in blocks(len(triangles), TRIANGLES_AT_ONCE):
+        a, b, c = (vertices[triangles[part, i]] for i in range(3))
+        doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        longest_squared = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
+        result[part] = doubled_area > MIN_HEIGHT * longest_squared
+    return result

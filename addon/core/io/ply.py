@@ -112,10 +112,10 @@ def _records(content: bytes) -> dict[str, _Records]:
 def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
     if "vertex" not in records_of:
         raise ValueError("holds no vertices")
-    place, *pairs = (records_of["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
-    if place is None:
+    vertices, *pairs = (records_of["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
+    if vertices is None:
         raise ValueError("has vertices without x, y and z")
-    vertices = place.astype(np.float64)
+    vertices = vertices.astype(np.float64, copy=False)
     if "face" not in records_of:
         none = np.zeros((0, 3), np.int32)
         return RawMesh(vertices, none, name=name, faces=Faces(0, np.zeros(0, np.int64), True, none))
@@ -129,10 +129,13 @@ def _mesh(records_of: dict[str, _Records], name: str) -> RawMesh:
     if ids is not None:
         # What is no whole number, or larger than any, is no object's; NaN is less than nothing.
         whole = np.where(np.abs(ids) < float(1 << 62), ids, -1) if ids.dtype.kind == "f" else ids
-        ids = whole[:, 0].astype(np.int64)[source]
+        ids = whole[source, 0].astype(np.int64)
+    far = faces.columns(("far",))
+    far = None if far is None else far[:, 0][source] > 0
     pair = next((pair for pair in pairs if pair is not None), None)
     uv = None if pair is None else pair.astype(np.float32)[triangles]
-    return RawMesh(vertices, triangles, ids, uv, name=name, faces=Faces(len(faces.counts[index]), source, True, corner))
+    counted = Faces(len(faces.counts[index]), source, True, corner)
+    return RawMesh(vertices, triangles, ids, uv, name=name, faces=counted, far=far)
 
 
 def parse_header(content: bytes) -> tuple[str, list[Element], int]:
@@ -199,7 +202,7 @@ class _Records:
     counts : dict of str to (n,) int64
         Entries of each list property.
     places : dict of str to (n,) int64
-        Where each property's value, or its first entry, begins.
+        Where each property's value, or its first entry, begins; (1,), of the first, where all records have one size.
     end : int
         Where the records end.
     """
@@ -211,11 +214,16 @@ class _Records:
             what = f"claims {n} of '{element.name}' but ends before them"
             raise ValueError(f"{what}: it is cut off, or its header is wrong")
         lists = [p for p in element.properties if p.count_kind]
-        self.counts = dict(zip((p.name for p in lists), self._lengths(lists, at).T))
-        entries = {p.name: self.counts[p.name] * self._kind(p.kind).itemsize for p in lists}
-        size = sum(sizes) + sum(entries.values(), np.zeros(n, np.int64))
+        scalars = {p.name for p in element.properties if not p.count_kind}
+        if len(scalars.union(p.name for p in lists)) < len(scalars) + len(lists):
+            raise ValueError(f"gives a list of '{element.name}' a name that it gives twice")
+        lengths = self._lengths(lists, at)
+        self.counts = {p.name: np.broadcast_to(column, n) for p, column in zip(lists, lengths.T)}
+        entries = {p.name: column * self._kind(p.kind).itemsize for p, column in zip(lists, lengths.T)}
+        size = sum(sizes) + sum(entries.values(), np.zeros(len(lengths), np.int64))
+        self._step = int(size[0]) if len(size) == 1 else 0
         place = at + np.cumsum(size) - size
-        self.end = at + int(size.sum())
+        self.end = at + int(np.broadcast_to(size, n).sum())
         if self.end > data.size:
             raise ValueError(f"ends within its '{element.name}' records, or they are damaged")
         self.places: dict[str, np.ndarray] = {}
@@ -234,22 +242,27 @@ class _Records:
         """The entries of all lists `name`, one list after the other."""
         kind = next(p.kind for p in self._element.properties if p.name == name)
         counts = self.counts[name]
+        if self._step:
+            return self._take(self.places[name], kind, int(counts[0]))
         inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         return self._take(np.repeat(self.places[name], counts) + inside * self._kind(kind).itemsize, kind)
 
     def _kind(self, kind: str) -> np.dtype:
         return np.dtype(self._order + kind if self._order else np.float64)
 
-    def _take(self, at: np.ndarray, kind: str) -> np.ndarray:
-        """The value at each of the positions `at` ((k,) int)."""
+    def _take(self, at: np.ndarray, kind: str, length: int = 1) -> np.ndarray:
+        """The value at each of the positions `at` ((k,) int); of records of one size the `length` values of each."""
         dtype = self._kind(kind)
+        if self._step:
+            shape, strides = (self._element.count, length), (self._step, dtype.itemsize)
+            return np.ndarray(shape, dtype, self._data, int(at[0]), strides).reshape(-1)
         return self._data[at[:, None] + np.arange(dtype.itemsize)].view(dtype)[:, 0]
 
     def _lengths(self, lists: list[Property], at: int) -> np.ndarray:
-        """Entries of each list of each record, (n, lists) int64."""
+        """Entries of each list of each record, (n, lists) int64, or (1, lists) where all are as long as the first's."""
         n = self._element.count
         if not n or not lists:
-            return np.zeros((n, len(lists)), np.int64)
+            return np.zeros((min(n, 1), len(lists)), np.int64)
         first, size = self._walked(1, at)
         if size * n <= self._data.size - at:  # lists as long as the first record's, which holds for nearly every mesh
             place, same = at, True
@@ -261,7 +274,7 @@ class _Records:
                     place += count * self._kind(p.kind).itemsize
                 place += kind.itemsize
             if same:
-                return np.broadcast_to(first, (n, len(lists)))
+                return first
         return self._walked(n, at)[0]
 
     def _walked(self, records: int, at: int) -> tuple[np.ndarray, int]:
@@ -306,29 +319,32 @@ def _triangles(
     corner : (t, 3) int32
         Which of its corners they are.
     """
-    of_entry = np.repeat(np.arange(len(counts)), counts)
-    bad = ~((entries >= 0) & (entries < len(vertices)) & (entries == np.floor(entries))) & (counts[of_entry] >= 3)
-    if bad.any():
-        first_bad = int(bad.argmax())
-        raise ValueError(
-            f"has a face ({of_entry[first_bad]}) that points to vertex {entries[first_bad]} of {len(vertices)}"
-        )
-    first, pieces = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    end, pieces = np.cumsum(counts), np.maximum(counts - 2, 0)
+    bad = np.flatnonzero(~((entries >= 0) & (entries < len(vertices)) & (entries % 1 == 0)))
+    face = np.searchsorted(end, bad, "right")
+    bad, face = bad[pieces[face] > 0], face[pieces[face] > 0]
+    if len(bad):
+        raise ValueError(f"has a face ({face[0]}) that points to vertex {entries[bad[0]]} of {len(vertices)}")
     face = np.repeat(np.arange(len(counts)), pieces)
     later = (1 + np.arange(len(face)) - np.repeat(np.cumsum(pieces) - pieces, pieces)).astype(np.int32)
     corner = np.stack([0 * later, later, later + 1], -1)
 
     quads = np.flatnonzero(counts == 4)
-    a, b, c, d = (vertices[entries[first[quads] + i].astype(np.int64)] for i in range(4))
+    a, b, c, d = (vertices[entries[end[quads] - 4 + i].astype(np.int64)] for i in range(4))
     with np.errstate(invalid="ignore", over="ignore"):
         shorter = ((b - d) ** 2).sum(1) < ((a - c) ** 2).sum(1)
     turned = np.isin(face, quads[shorter])
     corner[turned & (later == 1)] = 0, 1, 3
     corner[turned & (later == 2)] = 1, 2, 3
-    return entries[first[face, None] + corner].astype(np.int32), face, corner
+    begin, triangles = (end - counts)[face], np.empty(corner.shape, np.int32)
+    for i in range(3):
+        triangles[:, i] = entries[begin + corner[:, i]]
+    return triangles, face, corner
 
 
-def ply_bytes(vertices: np.ndarray, faces: Sequence[tuple[np.ndarray, np.ndarray | int]]) -> bytes:
+def ply_bytes(
+    vertices: np.ndarray, faces: Sequence[tuple[np.ndarray, np.ndarray | int | None]], far: np.ndarray | None = None
+) -> bytes:
     """The content of a little-endian PLY file with an object on each face, as `read_ply` reads it.
 
     Parameters
@@ -336,19 +352,30 @@ def ply_bytes(vertices: np.ndarray, faces: Sequence[tuple[np.ndarray, np.ndarray
     vertices : (v, 3) float32 or float64
         Stored in that precision.
     faces : sequence of (index, object_id)
-        Index is (f, k) int, polygons of k corners each; the object is one of each, (f,) int, or of all.
+        Index is (f, k) int, polygons of k corners each; the object is one of each, (f,) int, or of all; None leaves
+        objects out, of all faces.
+    far : (f,) bool, optional
+        As in `Mesh`, of all faces.
     """
     kind = {4: "float", 8: "double"}[vertices.itemsize]
-    records = []
+    has_objects = all(object_id is not None for _, object_id in faces)
+    extra = [("object_id", "<i4")] * has_objects + [("far", "u1")] * (far is not None)
+    records, start = [], 0
     for index, object_id in faces:
-        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), ("object_id", "<i4")])
-        record["n"], record["v"], record["object_id"] = index.shape[1], index, object_id
+        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), *extra])
+        record["n"], record["v"] = index.shape[1], index
+        if has_objects:
+            record["object_id"] = object_id
+        if far is not None:
+            record["far"] = far[start : start + len(index)]
+        start += len(index)
         records.append(record)
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
         f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
-        f"element face {sum(map(len, records))}\nproperty list uchar int vertex_indices\nproperty int object_id\n"
-        "end_header\n"
+        f"element face {start}\nproperty list uchar int vertex_indices\n"
+        + "".join(f"property {'int' if size == '<i4' else 'uchar'} {name}\n" for name, size in extra)
+        + "end_header\n"
     )
     places = vertices.astype(f"<f{vertices.itemsize}")
     return b"".join([header.encode(), places.tobytes(), *(record.tobytes() for record in records)])

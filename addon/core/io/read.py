@@ -27,6 +27,7 @@ from .id_pictures import check_ids, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading, usable
 from .mesh_repair import repair
 from .orientation import oriented
+from .part import apart, part_in
 from .picture import too_few_bytes
 from .pictures import picture_note, picture_size, read_picture
 from .pixels import read_pixels
@@ -54,8 +55,14 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         what = "is a file, not a folder" if root.exists() else "does not exist"
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     check_segments(reading.segments)  # before a video is read through
-    reader = reader_for(root, reading.format)
-    layout = laid_on(reader.read(root, reading), reading.segments, root)
+    part, source = part_in(root), root
+    if part is not None:
+        reading, source = part.reading_of_whole(reading), part.whole
+    reader = reader_for(source, reading.format)
+    layout = reader.read(source, reading)
+    if part is not None:
+        layout = part.taken(layout, reading)
+    layout = laid_on(layout, reading.segments, root)
     listed = root / instances.FILE
     if layout.names is None and listed.exists():
         layout = replace(layout, names=instances.read_instances(listed), names_file=instances.FILE)
@@ -65,12 +72,13 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     _refuse_too_many(root, layout, [*layout.problems, *absent])
     convention = parse(reading.convention)
     layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
-    frames, more = _usable(root, _exposed(layout, reading), reading.outside)
+    frames, more = _usable(source, _exposed(layout, reading), reading.outside)
     frames, grouped = group_brackets(frames)
     mesh, objects, warnings = _objects(layout, frames, reading.segments == SHAPE)
     if layout.names is not None and reading.segments != SHAPE and Path(layout.names_file).name == instances.FILE:
         objects, notes = instances.with_parts(objects, root / layout.names_file)
         warnings += notes
+    mesh, objects = apart(mesh, objects)
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
     frames = fold(frames, clipped)
     notes = [*grouped, *_chosen(frames), *notes]
@@ -139,8 +147,9 @@ def _objects(layout: Layout, frames: list[Frame], by_shape: bool) -> tuple[Mesh,
     closed = np.arange(count, len(raw.triangles), dtype=np.int32)
     lit = None if frames else raw.lit
     mesh = Mesh(
-        raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None, whole=not has_objects
-    )
+        raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None, whole=not has_objects,
+        far=raw.far,
+    )  # fmt: skip
     return mesh, objects, warnings + more
 
 
@@ -161,7 +170,8 @@ def _pixels(frame: Frame) -> Pixels:
 def _with(mesh: RawMesh, added: Closing) -> RawMesh:
     triangles = np.concatenate([mesh.triangles, added.triangles + len(mesh.vertices)]).astype(np.int32)
     uv = None if mesh.uv is None else np.concatenate([mesh.uv, np.zeros((len(added.triangles), 3, 2), np.float32)])
-    return replace(mesh, vertices=np.concatenate([mesh.vertices, added.vertices]), triangles=triangles, uv=uv)
+    far = None if mesh.far is None else np.concatenate([mesh.far, np.zeros(len(added.triangles), bool)])
+    return replace(mesh, vertices=np.concatenate([mesh.vertices, added.vertices]), triangles=triangles, uv=uv, far=far)
 
 
 def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], list[str]]:
@@ -219,18 +229,20 @@ def _check_frame(frame: Frame) -> None:
 
 def describe(capture: Capture) -> dict[str, Any]:
     """What the command `info` tells, ready for JSON: counts, sizes in pixels and metres, objects, warnings."""
-    counts = dict(zip(*(a.tolist() for a in np.unique(capture.mesh.object_id, return_counts=True))))
-    corners = capture.mesh.vertices[capture.mesh.triangles]
-    low, high = corners.min((0, 1)), corners.max((0, 1))
-    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
+    mesh = replace(capture.mesh)  # whose normals are not needed any more afterwards
+    counts = dict(zip(*(a.tolist() for a in np.unique(mesh.object_id, return_counts=True))))
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.triangles] = True
+    places = mesh.vertices[used]
+    low, high = places.min(0), places.max(0)
     cameras = [frame.camera for frame in capture.frames]
     exposures = sorted(frame.exposure for frame in unfold(capture.frames))
     return {
         "capture": str(capture.root),
         "format": capture.format,
-        "triangles": len(capture.mesh.triangles),
-        "vertices": len(capture.mesh.vertices),
-        "area_m2": area / 2,
+        "triangles": len(mesh.triangles),
+        "vertices": len(mesh.vertices),
+        "area_m2": float(mesh.geometry[1].sum()),
         "bounds_m": [low.tolist(), high.tolist()],
         "extent_m": (high - low).tolist(),
         "frames": len(capture.frames),

@@ -25,7 +25,7 @@ def as_scanned(mesh: Mesh) -> Mesh:
     count = int(mesh.triangles[mesh.closed].min())  # their vertices come last
     return replace(
         mesh, vertices=mesh.vertices[:count], triangles=mesh.triangles[scanned], object_id=mesh.object_id[scanned],
-        uv=uv, closed=None,
+        uv=uv, closed=None, far=None if mesh.far is None else mesh.far[scanned],
     )  # fmt: skip
 
 

@@ -300,6 +300,8 @@ class Mesh:
         Triangles that the capture lacks, by which its holes were closed (`closing`).
     whole : bool
         Its objects are unknown: they are parts by shape alone, and where two of them border one surface may continue.
+    far : (t,) bool or None
+        Triangles of other parts of a building (`division`): whole objects, there for the light that they send.
     """
 
     vertices: np.ndarray
@@ -310,6 +312,7 @@ class Mesh:
     backs: np.ndarray | None = None
     closed: np.ndarray | None = None
     whole: bool = False
+    far: np.ndarray | None = None
 
     @cached_property
     def geometry(self) -> tuple[np.ndarray, np.ndarray]:

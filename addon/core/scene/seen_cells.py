@@ -1,7 +1,7 @@
 """Where on the surface the frames look, and the coarse cells that stand for the rest.
 
 Light that no frame saw still counts, but texels there show nothing that was measured: one element stands for a whole
-cell of them.
+cell of them. So it does on what belongs to another part of a building (`Mesh.far`), in larger cells.
 """
 
 from collections.abc import Sequence
@@ -34,6 +34,13 @@ class SeenCells:
         At least one.
     texel : float
         Edge of an element in metres.
+
+    Attributes
+    ----------
+    met : (t,) bool
+        Triangles that rays of the frames met closely.
+    coarser : (t,) float64
+        How many times as wide as others the coarse cells on each triangle are.
     """
 
     def __init__(self, mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], texel: float, threads: int = 0):
@@ -41,14 +48,15 @@ class SeenCells:
         self._label, area = sides(mesh), mesh.geometry[1]
         centres = np.array([camera.centre for camera in cameras])
         self._low, self._high = centres.min(0), centres.max(0)
-
+        far = np.zeros(len(mesh.triangles), bool) if mesh.far is None else mesh.far
+        self.coarser = np.where(far, SPARSE.far / SPARSE.coarse, 1.0)
         large = np.sqrt(area) > SPARSE.large * texel
 
         def look(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             """Triangles and cells that a camera's rays meet closely, and its pairs of large triangles and cells."""
             pixels, directions, hits = sparse_hits(scene, camera)
             # What fills a pixel with a whole cell is resolved no better than what no frame saw.
-            near = np.flatnonzero(pixel_edges(camera, pixels, hits) <= self._edge)
+            near = np.flatnonzero((pixel_edges(camera, pixels, hits) <= self._edge) & ~far[hits.triangle])
             triangle = hits.triangle[near]
             position = camera.centre + hits.distance[near, None] * directions[near]
             key = self._key(position, triangle, 0)
@@ -97,12 +105,12 @@ class SeenCells:
     def coarse(self, position: np.ndarray, triangle: np.ndarray, coarser: np.ndarray | float = 1.0) -> np.ndarray:
         """Number of the coarse cell of each point ((n, 3) float, of triangles (n,) int), (n,) uint64.
 
-        Cells are `coarser` ((n,) float, or one for all) times as wide as usual.
+        Cells are `coarser` ((n,) float, or one for all) times as wide as usual there.
         """
-        coarser = np.broadcast_to(coarser, len(position))
+        wider = coarser * self.coarser[triangle]
         number = np.empty(len(position), np.uint64)
         for part in blocks(len(position), ROWS):
-            edge = self.coarse_edge(position[part], coarser[part])
+            edge = self.coarse_edge(position[part], wider[part])
             number[part] = self._key(
                 position[part], triangle[part], np.log2(edge / self._edge).round().astype(np.int64)
             )

@@ -40,14 +40,15 @@ class Sparse:
         _, area = mesh.geometry
         side = np.sqrt(area)
         # Half a cell, so that a triangle apart is about as fine as the cells are.
-        edge = np.where(seen, texel, cells.coarse_edge(self._middle) / 2)
+        coarse_edge = cells.coarse_edge(self._middle, cells.coarser)
+        edge = np.where(seen, texel, coarse_edge / 2)
         edge = np.maximum(edge, np.where(seen, 0, side / SPARSE.large))
         large = np.flatnonzero(seen & (side > SPARSE.large * texel))
         coarse = texel * side[large] / np.sqrt(SPARSE.seen_part * cells.area_met(large))
         edge[large] = np.where(coarse > 2 * texel, coarse, texel)
         self.edge = edge
         longest = np.max([np.linalg.norm(corner[:, k] - corner[:, k - 1], axis=1) for k in range(3)], 0)
-        self._small = longest <= np.where(seen, SPARSE.fine * texel, 2 * cells.coarse_edge(self._middle))
+        self._small = longest <= np.where(seen, SPARSE.fine * texel, 2 * coarse_edge)
         self._seen = seen
         self.triangle = np.flatnonzero((edge > 1.5 * texel) | self._small)
 

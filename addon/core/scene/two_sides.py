@@ -102,6 +102,7 @@ def with_backs(mesh: Mesh, chosen: np.ndarray) -> Mesh:
         object_id=np.concatenate([mesh.object_id, mesh.object_id[chosen]]),
         uv=None if mesh.uv is None else np.concatenate([mesh.uv, flipped(mesh.uv[chosen])]),
         backs=np.asarray(chosen, np.int32),
+        far=None if mesh.far is None else np.concatenate([mesh.far, mesh.far[chosen]]),
     )
 
 
@@ -111,7 +112,10 @@ def fronts(mesh: Mesh) -> tuple[Mesh, np.ndarray]:
         return mesh, np.arange(len(mesh.triangles))
     count = len(mesh.triangles) - len(mesh.backs)
     uv = None if mesh.uv is None else mesh.uv[:count]
-    single = replace(mesh, triangles=mesh.triangles[:count], object_id=mesh.object_id[:count], uv=uv, backs=None)
+    far = None if mesh.far is None else mesh.far[:count]
+    single = replace(
+        mesh, triangles=mesh.triangles[:count], object_id=mesh.object_id[:count], uv=uv, backs=None, far=far
+    )
     return single, np.r_[np.arange(count), mesh.backs]
 
 

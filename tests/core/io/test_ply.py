@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.io.ply import read_ply
+from addon.core.io.ply import ply_bytes, read_ply
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 2, 0)]
 FACES = [(0, 1, 2), (0, 1, 2, 3), (0, 1, 2, 4, 3), (2, 4, 3)]
@@ -113,6 +113,8 @@ HEADER = "ply\nformat {0} 1.0\nelement vertex {1}\nproperty float x\nproperty fl
     (HEADER.format("ascii", 3, 1, "uchar").replace("x\n", "a\n"), "claims|without x"),
     (HEADER.format("ascii", 1, 0, "uchar").replace("float x\n", "float a\n") + "0 0 0", "without x"),
     (HEADER.format("ascii", 1, 0, "uchar").replace("vertex_indices", "other") + "0 0 0", "without vertex_indices"),
+    (HEADER.format("ascii", 3, 1, "uchar").replace("end_", "property list uchar int vertex_indices\nend_")
+     + "0 0 0 1 0 0 1 1 0 3 0 1 2 3 0 1 2", "a name that it gives twice"),
 ])  # fmt: skip
 def test_what_is_wrong_is_one_sentence(tmp_path, content, words):
     path = write(tmp_path, content)
@@ -166,6 +168,18 @@ def test_large_meshes_are_read_at_once(tmp_path, mixed):
     assert len(mesh.triangles) == n + quad.sum()
     first = np.flatnonzero(~quad)[-1]
     assert mesh.triangles[first + quad[:first].sum()].tolist() == corners[first, :3].tolist()
+
+
+def test_a_large_mesh_takes_little_memory(tmp_path):
+    """Where all faces have as many corners, no positions of values: once eight bytes for each of the file."""
+    content = ply_bytes(np.eye(3, dtype=np.float32), [(np.tile([0, 1, 2], (100_000, 1)), 7)])
+    path = write(tmp_path, content)
+    tracemalloc.start()
+    mesh = read_ply(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (mesh.triangles == [0, 1, 2]).all() and (mesh.object_id == 7).all() and len(mesh.triangles) == 100_000
+    assert peak < 8 * len(content)
 
 
 def test_the_living_room(shared):
