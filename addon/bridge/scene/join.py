@@ -11,7 +11,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-import bmesh
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -277,6 +276,8 @@ def _distance(tree: BVHTree, point: np.ndarray) -> float:
 
 def _remove_faces(obj: bpy.types.Object, faces: np.ndarray) -> None:
     """Take faces ((f,) bool) out of an object's mesh, with what only they use; it counts as made so."""
+    import bmesh  # pip's bpy brings it, so it has to be imported first
+
     data = obj.data
     cut = bmesh.new()
     cut.from_mesh(data)
