@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-import io
 import json
 import os
 import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,8 +39,8 @@ from addon.core.results.values import to_store
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.scene.samples import Samples
-from addon.farm.join import add_join
 from addon.version import VERSION
+from tests.farm.conftest import WORKER
 
 WALL, BOX, LAMP, TILES = 1, 2, 3, 4
 INSTANCES = (Instance(WALL, "wall"), Instance(BOX, "box"), Instance(LAMP, "lamp"), Instance(TILES, "tiles", 0, WALL))
@@ -334,15 +333,13 @@ def test_what_cannot_be_written_is_told(results, tmp_path):
         join(results, tmp_path / "file" / "out")
 
 
-def test_the_command(results, tmp_path, monkeypatch):
-    parser = argparse.ArgumentParser()
-    add_join(parser.add_subparsers())
+def test_the_command(results, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    arguments = parser.parse_args(["join", "results/1", "results/2", "--out", "out"])
-    stream = io.StringIO()
-    arguments.function(arguments, stream)
-    assert stream.getvalue().splitlines()[1:] == [f"Done: {os.path.join('out', 'scene.blend')}"]
-    assert stream.getvalue().startswith("Warning: A scene has one light from outside: that of 'results/2' was taken")
+    assert cli.main(["join", "results/1", "results/2", "--out", "out"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == f"Done: {os.path.join('out', 'scene.blend')}"
+    (warning,) = [line for line in lines if line.startswith("Warning")]
+    assert "that of 'results/2' was taken" in warning
     assert (tmp_path / "out" / "scene.blend").is_file()
 
 
@@ -356,7 +353,9 @@ def test_a_room_that_was_divided_comes_together(tiny_capture, tmp_path):
     results = [tmp_path / "results" / part.name for part in sorted(parts.iterdir())]
     for result in results:
         assert cli.main(["recover", str(parts / result.name), "--out", str(result), *quick.split()]) == 0
-    join(results, tmp_path / "out")
+    # In a process of its own, where nothing has loaded Blender yet.
+    command = [*WORKER, "join", *map(str, results), "--out", str(tmp_path / "out"), "--quiet"]
+    assert subprocess.run(command, check=False).returncode == 0
     found = {}
     for folder in (whole, tmp_path / "out"):
         bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
