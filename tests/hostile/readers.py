@@ -184,6 +184,18 @@ def fipt_ids(ending: str) -> Reader:
     return Reader(make, lambda root: capture(root, Reading(mesh=root / "mesh.ply")))
 
 
+def part(root: Path) -> Path:
+    """A part of a building, beside it."""
+    from addon.core.io.part import PART, write_part
+    from addon.core.scene.division import Division
+
+    root.mkdir(parents=True)
+    whole = read_capture(cases.CaptureOnDisk(root / "whole", 6).root)
+    triangles = np.arange(len(whole.mesh.triangles))
+    write_part(root / "part", whole, Division(triangles, triangles == 0, np.arange(6)), AS_FOUND)
+    return root / "part" / PART
+
+
 def recording(root: Path) -> Path:
     """Stray Scanner's, whose video is spoiled."""
     return test_video.write_recording(root, range(30, 200, 20)) / "rgb.mp4"
@@ -256,6 +268,7 @@ def readers() -> dict[str, Reader]:
     if importlib.util.find_spec("av"):
         found["video"] = Reader(recording, capture)
     found |= {f"ids {ending}": fipt_ids(ending) for ending in ("exr", "png")}
+    found["part"] = Reader(part, lambda root: capture(root / "part"))
     found["ptex"] = Reader(ptex, read_ptex)
     found |= {f"result {name}": result(name) for name in ("room.npz", "stages/surface.npz")}
     for name in ("materials", "overrides", "report", "openings", "capture"):

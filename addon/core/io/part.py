@@ -23,6 +23,8 @@ from .instances import FILE
 from .layout import Layout, Reading
 from .meshes import MESH
 from .ply import ply_bytes, read_ply
+from .readers import readers
+from .transfer import check_transfer
 
 PART = "part.json"
 KEPT = ("format", "transfer", "convention")
@@ -82,19 +84,20 @@ def part_in(folder: Path) -> PartOf | None:
     if not path.is_file():
         return None
     content = read_json(path)
-    whole, frames, reading = content.get("capture"), content.get("frames"), content.get("reading")
-    if (
-        not isinstance(whole, str)
-        or not isinstance(frames, list)
-        or not isinstance(reading, dict)
-        or not all(isinstance(name, str) and "\0" not in name for name in [whole, *frames])
-    ):
-        raise BadInputError(f"'{path}' does not tell what it is a part of; divide the capture again.")
-    source = Path(os.path.normpath(folder / whole))
-    if not source.is_dir():
+    try:
+        source = Path(os.path.normpath(folder / content["capture"]))
+        pictures = frozenset(source / name for name in content["frames"] if "\0" not in name)
+        reading = {name: str(content["reading"][name]) for name in KEPT}
+        check_transfer(reading["transfer"])
+        parse(reading["convention"])
+        if reading["format"] and reading["format"] not in {reader.name for reader in readers()}:
+            raise ValueError
+        there = source.is_dir()
+    except (KeyError, TypeError, ValueError, OSError, BadInputError) as error:
+        raise BadInputError(f"'{path}' does not tell what it is a part of; divide the capture again.") from error
+    if not there:
         raise BadInputError(f"'{folder}' is a part of the capture '{source}', which is not there; divide it again.")
-    texts = {name: value for name, value in reading.items() if name in KEPT and isinstance(value, str)}
-    return PartOf(folder, source, frozenset(source / name for name in frames), texts)
+    return PartOf(folder, source, pictures, reading)
 
 
 def apart(mesh: Mesh, instances: tuple[Instance, ...]) -> tuple[Mesh, tuple[Instance, ...]]:

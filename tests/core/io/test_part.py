@@ -100,9 +100,11 @@ def test_a_part_that_moved_with_its_capture_is_read(whole, tmp_path):
     [
         ({"capture": "../nowhere"}, "is not there"),
         ({"frames": ["images/999.exr"]}, "999.exr"),
-        ({"frames": "all"}, "does not tell"),
+        ({"frames": 3}, "does not tell"),
         ({"capture": 3}, "does not tell"),
-        ({"reading": {"format": "nonsense"}}, "nonsense"),
+        ({"reading": {"format": "nonsense", "transfer": "", "convention": ""}}, "does not tell"),
+        ({"reading": {"format": "", "transfer": "nonsense", "convention": ""}}, "does not tell"),
+        ({"reading": {}}, "does not tell"),
     ],
 )
 def test_a_part_that_fits_no_capture_is_refused(part, change, words):
