@@ -38,12 +38,13 @@ def divide_command(arguments: argparse.Namespace, stream: TextIO) -> None:
         from ..core.io.part import part_in, write_part
         from ..core.io.read import read_capture
         from ..core.memory import SHARE, free_memory
+        from ..core.scene.closed_mesh import without_closing
         from ..core.scene.division import divided, parts_for, seen_by
         from ..core.scene.rays import RayScene
     part = part_in(arguments.capture)
     if part is not None:
         raise BadInputError(f"'{arguments.capture}' is a part already; divide '{part.whole}' into more.")
-    whole = read_capture(arguments.capture, reading)
+    whole = without_closing(read_capture(arguments.capture, reading))  # each part's holes are closed where it is read
     if not whole.frames:
         raise BadInputError(f"Capture '{arguments.capture}' has no frames, by which it would be divided; recover it.")
     scene = RayScene(whole.mesh.vertices, whole.mesh.triangles)

@@ -128,48 +128,50 @@ def _owners(mesh: Mesh, seen: Seen, count: int) -> np.ndarray:
 
     An object is one part's, that has most of it, unless it is large: then each of its triangles is where it lies.
     """
-    centre = mesh.vertices[mesh.triangles].mean(1)
-    cell_object = mesh.object_id[seen.triangle]
-    of_cell = np.zeros(len(seen.number), np.int32)
-    owner = np.zeros(len(centre), np.int32)
-    _halve(seen.position, cell_object, centre, np.arange(len(of_cell)), np.arange(len(owner)), count, of_cell, owner)
-    objects = np.unique(mesh.object_id)
-    index = np.searchsorted(objects, cell_object)
-    cells = csr_matrix((np.ones(len(index), np.int64), (index, of_cell)), (len(objects), count)).toarray()
-    triangles = csr_matrix(
-        (np.ones(len(owner), np.int64), (np.searchsorted(objects, mesh.object_id), owner)), (len(objects), count)
-    ).toarray()
+    tree = _tree(seen.position, mesh.object_id[seen.triangle], count)
+    of_cell, owner = _part_at(tree, seen.position), _part_at(tree, mesh.vertices[mesh.triangles].mean(1))
+    objects, row = np.unique(mesh.object_id, return_inverse=True)
+
+    def shares(of_object: np.ndarray, part: np.ndarray) -> np.ndarray:
+        ones = np.ones(len(part), np.int64)
+        return csr_matrix((ones, (of_object, part)), (len(objects), count)).toarray()
+
+    cells, triangles = shares(row[seen.triangle], of_cell), shares(row, owner)
     most = np.where(cells.any(1), cells.argmax(1), triangles.argmax(1)).astype(np.int32)
     large = cells.sum(1) > DIVISION.large * len(of_cell) / count
-    row = np.searchsorted(objects, mesh.object_id)
     return np.where(large[row], owner, most[row])
 
 
-def _halve(
-    position: np.ndarray,
-    object_id: np.ndarray,
-    centre: np.ndarray,
-    cells: np.ndarray,
-    triangles: np.ndarray,
-    count: int,
-    of_cell: np.ndarray,
-    of_triangle: np.ndarray,
-    first: int = 0,
-) -> None:
-    """Number the parts of some cells and triangles from `first` on, into `of_cell` and `of_triangle`."""
-    of_cell[cells], of_triangle[triangles] = first, first
-    if count < 2 or len(cells) < 2:
-        return
-    points = position[cells]
-    low, high = np.percentile(points, (5, 95), axis=0)
-    axis = int((high - low).argmax())
-    lower = count // 2
-    plane = _plane(points[:, axis], object_id[cells], lower / count, DIVISION.off / count)
-    for side, parts, start in ((0, lower, first), (1, count - lower, first + lower)):
-        _halve(
-            position, object_id, centre, cells[(points[:, axis] >= plane) == side],
-            triangles[(centre[triangles, axis] >= plane) == side], parts, of_cell, of_triangle, start,
-        )  # fmt: skip
+class _Node(NamedTuple):
+    """Space halved by a plane across an axis; below and above it a node each, or a part's number."""
+
+    axis: int
+    plane: float
+    below: "_Node | int"
+    above: "_Node | int"
+
+
+def _tree(position: np.ndarray, object_id: np.ndarray, count: int, first: int = 0) -> _Node | int:
+    """Space divided so that each part, numbered from `first` on, has as many of some cells: a k-d tree."""
+    if count < 2 or len(position) < 2:
+        return first
+    low, high = np.percentile(position, (5, 95), axis=0)
+    axis, lower = int((high - low).argmax()), count // 2
+    plane = _plane(position[:, axis], object_id, lower / count, DIVISION.off / count)
+    below = position[:, axis] < plane
+    return _Node(
+        axis, plane, _tree(position[below], object_id[below], lower, first),
+        _tree(position[~below], object_id[~below], count - lower, first + lower),
+    )  # fmt: skip
+
+
+def _part_at(tree: _Node | int, points: np.ndarray) -> np.ndarray:
+    """The part that points ((n, 3) float) lie in, (n,) int32."""
+    if not isinstance(tree, _Node):
+        return np.full(len(points), tree, np.int32)
+    part, below = np.empty(len(points), np.int32), points[:, tree.axis] < tree.plane
+    part[below], part[~below] = _part_at(tree.below, points[below]), _part_at(tree.above, points[~below])
+    return part
 
 
 def _plane(place: np.ndarray, object_id: np.ndarray, share: float, off: float) -> float:

@@ -361,7 +361,7 @@ class DivisionParams:
     off : float
         A part may have this share of its cells less or more, so that planes cut what is empty.
     planes : int
-        Planes to choose from.
+        The widest gaps between cells that a plane is tried in.
     rays : int
         From each part's surface, to find what sends light into it.
     least : float
