@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..cli.common import add_common, add_reading, needed_packages, reading_from
-from ..core.errors import BadInputError, StorageError
+from ..core.errors import BadInputError
 
 
 def add_divide(commands) -> None:
@@ -55,16 +55,7 @@ def divide_command(arguments: argparse.Namespace, stream: TextIO) -> None:
     digits = max(2, len(str(len(parts))))
     for number, part in enumerate(parts, 1):
         folder = arguments.out / f"{number:0{digits}}"
-        try:
-            write_part(folder, whole, part, reading)
-        except OSError as error:
-            raise StorageError(
-                f"Part '{folder}' can't be written ({error.strerror or error}); free some space or choose another "
-                "folder."
-            ) from error
+        write_part(folder, whole, part, reading)
         if not arguments.quiet:
-            near = len(part.triangle) - int(part.far.sum())
-            print(
-                f"{folder}: {near} triangles, {int(part.far.sum())} of other parts, {len(part.frames)} frames",
-                file=stream,
-            )
+            near, far = int((~part.far).sum()), int(part.far.sum())
+            print(f"{folder}: {near} triangles, {far} of other parts, {len(part.frames)} frames", file=stream)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..atomic import write_bytes
-from ..errors import BadInputError
+from ..errors import BadInputError, StorageError
 from ..scene.division import Division
 from ..scene.model import Capture, Frame, Instance, Mesh
 from .conventions import parse, upright
@@ -119,7 +119,12 @@ def apart(mesh: Mesh, instances: tuple[Instance, ...]) -> tuple[Mesh, tuple[Inst
 
 def write_part(folder: Path, whole: Capture, division: Division, reading: Reading) -> None:
     """Write a part of a capture into a folder, which is made; `PART` comes last. Raises `StorageError`."""
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(
+            f"Part '{folder}' can't be written ({error.strerror or error}); free some space or choose another folder."
+        ) from error
     mesh = whole.mesh
     used, corners = np.unique(mesh.triangles[division.triangle], return_inverse=True)
     object_id = None if mesh.whole else mesh.object_id[division.triangle]

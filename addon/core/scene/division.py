@@ -16,7 +16,7 @@ from .model import Camera, Mesh
 from .params import DIVISION, FRAME_CHOICE, SPARSE
 from .rays import RayScene
 from .seen_cells import cell_numbers
-from .sparse_hits import pixel_edges, sparse_hits
+from .sparse_hits import pixel_edges, sparse_hits, step_for
 
 
 class Division(NamedTuple):
@@ -67,7 +67,7 @@ def seen_by(mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], threads: int
     normal = mesh.geometry[0]
 
     def look(camera: Camera) -> tuple[np.ndarray, ...]:
-        step = max(1, round(np.sqrt(camera.width * camera.height / FRAME_CHOICE.rays)))
+        step = step_for(camera, FRAME_CHOICE.rays)
         pixels, directions, hits = sparse_hits(scene, camera, step)
         facing = normal[hits.triangle]
         facing = np.where(np.einsum("ij,ij->i", facing, directions)[:, None] > 0, -facing, facing)
@@ -96,7 +96,7 @@ def _cells(position: np.ndarray, object_id: np.ndarray, edge: float) -> np.ndarr
     return cell_numbers(np.floor(position / edge).astype(np.int64), object_id, 0)
 
 
-def divided(mesh: Mesh, scene: RayScene, seen: Seen, count: int, seed: int = 0) -> list[Division]:
+def divided(mesh: Mesh, scene: RayScene, seen: Seen, count: int) -> list[Division]:
     """A capture's parts; fewer than `count` where there are no more cells.
 
     Parameters
@@ -107,7 +107,7 @@ def divided(mesh: Mesh, scene: RayScene, seen: Seen, count: int, seed: int = 0) 
         By the capture's cameras.
     """
     owner = _owners(mesh, seen, count)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     # What is cut lies in several parts: a piece is what one of them has of an object.
     piece = np.unique(owner.astype(np.int64) << 32 | mesh.object_id, return_inverse=True)[1].ravel()
     of_cell, parts = owner[seen.triangle], []

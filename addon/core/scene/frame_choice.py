@@ -14,7 +14,7 @@ from .model import Camera, Capture, Mesh
 from .params import FRAME_CHOICE
 from .rays import RayScene
 from .seen_cells import cell_numbers, sides
-from .sparse_hits import pixel_edges, sparse_hits
+from .sparse_hits import pixel_edges, sparse_hits, step_for
 
 
 def with_frames_that_add(capture: Capture, threads: int = 0) -> Capture:
@@ -38,7 +38,7 @@ def frames_that_add(mesh: Mesh, cameras: Sequence[Camera], threads: int = 0) -> 
 
     def look(camera: Camera) -> np.ndarray:
         """What a camera sees: numbers of cells, each at its resolution and from its direction."""
-        step = max(1, round(np.sqrt(camera.width * camera.height / FRAME_CHOICE.rays)))
+        step = step_for(camera, FRAME_CHOICE.rays)
         pixels, directions, hits = sparse_hits(scene, camera, step)
         level = np.log2(step * pixel_edges(camera, pixels, hits)).round().astype(np.int64)
         place = (camera.centre + hits.distance[:, None] * directions) / np.exp2(level)[:, None]

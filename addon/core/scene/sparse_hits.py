@@ -26,6 +26,11 @@ def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -
     return pixels[met], directions[met], hits.part(met)
 
 
+def step_for(camera: Camera, rays: int) -> int:
+    """The step of `sparse_hits` by which about so many rays go into a camera's frame."""
+    return max(1, round(np.sqrt(camera.width * camera.height / rays)))
+
+
 def pixel_edges(camera: Camera, pixels: np.ndarray, hits: Hits) -> np.ndarray:
     """Edge in metres of what each pixel ((n, 2) float), with the hit of its ray, covers where it is met head-on.
 
